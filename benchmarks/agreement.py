@@ -14,17 +14,18 @@ import numpy as np
 
 from chaosgym.arrays import Array
 from chaosgym.diagnosis.diagnose import DEFAULT_BUDGET, diagnose
-from chaosgym.diagnosis.lyapunov import Deviation, average_growth, exponent_from_series
+from chaosgym.diagnosis.lyapunov import Deviation
 from chaosgym.diagnosis.matrix_update import Form, depends_on_configuration, matrix_update_test
-from chaosgym.diagnosis.response import Diagnosis, Nature
 from chaosgym.diagnosis.response_type import default_tolerances
-from chaosgym.diagnosis.spectrum import power_spectrum
-from chaosgym.diagnosis.stroboscopic import find_recurrence, scales, subtract_bands
-from chaosgym.diagnosis.two_step import BROAD_FLOOR, two_step_test
-from chaosgym.diagnosis.zero_one import zero_one_statistic
 from chaosgym.errors import DiagnosisError, SimulationError
 from chaosgym.machines import Machine
 from chaosgym.machines.parameters import with_settings
+from chaosgym.series.exponent import average_growth, exponent_from_series
+from chaosgym.series.spectrum import power_spectrum
+from chaosgym.series.stroboscopic import find_recurrence, scales, subtract_bands
+from chaosgym.series.two_step import BROAD_FLOOR, two_step_test
+from chaosgym.series.verdict import Diagnosis, Nature
+from chaosgym.series.zero_one import zero_one_statistic
 from chaosgym.simulation import CycleRecord, parallel_map
 
 REFERENCE_CYCLES = 10_000

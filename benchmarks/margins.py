@@ -14,8 +14,8 @@ from typing import Any
 import numpy as np
 from tqdm import tqdm
 
+from chaosgym.branches.margins import margins_of
 from chaosgym.diagnosis import Neighbour, default_tolerances, diagnose, judge_type, response_type
-from chaosgym.diagnosis.margins import margins_of
 from chaosgym.errors import ChaosgymError
 from chaosgym.machines import Machine
 from chaosgym.machines.parameters import with_settings

@@ -23,7 +23,7 @@ from chaosgym.design.brief import template as brief_template
 from chaosgym.errors import ChaosgymError
 from chaosgym.machines.machine_file import machine_class, template
 from chaosgym.machines.modal_machine.archives import read_archive, read_matrix
-from chaosgym.signals.read import read_recording
+from chaosgym.recordings.read import read_recording
 from chaosgym.sweeps import read_sweep
 from chaosgym.sweeps.card import dataset_info
 

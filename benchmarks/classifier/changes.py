@@ -14,9 +14,9 @@ from numpy.typing import NDArray
 from tqdm import tqdm
 
 from chaosgym.diagnosis import default_tolerances
-from chaosgym.diagnosis.stroboscopic import irregularity
 from chaosgym.errors import ChaosgymError
 from chaosgym.machines import Machine
+from chaosgym.series.stroboscopic import irregularity
 from chaosgym.simulation import simulate
 from chaosgym.sweeps import Axis, SweepPlan
 

@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 
 from chaosgym.arrays import Array
-from chaosgym.diagnosis.determinism import determinism
+from chaosgym.series.determinism import determinism
 
 READINGS, RECORDS, NOISE = 500, 4, 0.05
 

@@ -12,9 +12,9 @@ import numpy as np
 from tqdm import tqdm
 
 from chaosgym.arrays import Array
+from chaosgym.branches.margins import margins
 from chaosgym.diagnosis import default_tolerances, find_periodic_orbit
 from chaosgym.diagnosis.diagnose import diagnose_alone
-from chaosgym.diagnosis.margins import margins
 from chaosgym.errors import ChaosgymError
 from chaosgym.machines import Machine
 from chaosgym.sweeps.dataset import LabelledSweep

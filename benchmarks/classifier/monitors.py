@@ -13,8 +13,8 @@ from numpy.typing import NDArray
 
 from benchmarks.classifier.changes import AFTER, SENSOR_ERROR, Trace
 from chaosgym.classifier import MachineClassifier
-from chaosgym.diagnosis.stroboscopic import noisy_class_residuals
-from chaosgym.monitor import CAP, DRIFT, LIMIT, Monitor
+from chaosgym.recordings.monitor import CAP, DRIFT, LIMIT, Monitor
+from chaosgym.series.stroboscopic import noisy_class_residuals
 
 Alarms = NDArray[np.bool_]
 Watcher = Callable[[NDArray[np.float64]], Alarms]
@@ -30,7 +30,7 @@ MERGED = 64
 
 
 def shipped(peaks: NDArray[np.float64]) -> Alarms:
-    """The monitor of ``chaosgym.monitor``."""
+    """The monitor of ``chaosgym.recordings.monitor``."""
     return np.array([bool(seen.alarm) for seen in Monitor(SENSOR_ERROR).watch(peaks)])
 
 

@@ -17,8 +17,8 @@ from chaosgym.control.controllers import Follow, Kriging, MapFollower
 from chaosgym.control.maps import maps_of
 from chaosgym.control.rollout import Played, play
 from chaosgym.control.statistics import bootstrap_interval
-from chaosgym.design.rating_life import LIFE_EXPONENT
 from chaosgym.envs.pool import read_pool
+from chaosgym.rating_life import LIFE_EXPONENT
 
 ANY, BEAM, CRANK = "chaosgym/AnyMachine-v0", "chaosgym/ImpactBeamTolerance-v1", "chaosgym/SliderCrankTolerance-v1"
 

@@ -15,10 +15,10 @@ from numpy.typing import NDArray
 from tqdm import tqdm
 
 from chaosgym.arrays import Array
-from chaosgym.design.rating_life import LIFE_EXPONENT
 from chaosgym.envs.pool import REACH, Kept, machine_of, pool_task
 from chaosgym.envs.task import LIFE_PRICE
 from chaosgym.machines.family import Ranged
+from chaosgym.rating_life import LIFE_EXPONENT
 
 SIZES = {"train": 512, "test": 256, "other_machines": 128}
 """Machines of each split."""

@@ -11,9 +11,10 @@ from typing import Any
 
 import numpy as np
 
-from chaosgym.diagnosis import TYPES, ResponseType, diagnose, response_type
+from chaosgym.diagnosis import ResponseType, diagnose, response_type
 from chaosgym.errors import DatasetError
 from chaosgym.machines import Machine
+from chaosgym.series import TYPES
 from chaosgym.simulation import parallel_map
 from chaosgym.sweeps.dataset import LabelledSweep
 from chaosgym.sweeps.label import RETRY

@@ -21,9 +21,9 @@ import matplotlib.pyplot as plt
 import chaosgym
 from chaosgym.design import Criteria
 from chaosgym.design.measured import evaluate_peaks
-from chaosgym.diagnosis.measured import judge_peaks
-from chaosgym.signals.columns import choose_force
-from chaosgym.signals.read import read_recording
+from chaosgym.recordings.columns import choose_force
+from chaosgym.recordings.judge import judge_peaks
+from chaosgym.recordings.read import read_recording
 
 recording = read_recording("../data/peaks.csv")
 force = choose_force(recording, "upper")

@@ -23,7 +23,8 @@ import matplotlib.pyplot as plt
 import numpy as np
 
 import chaosgym
-from chaosgym.diagnosis import find_periodic_orbit, largest_lyapunov_exponent, zero_one_statistic
+from chaosgym.diagnosis import find_periodic_orbit, largest_lyapunov_exponent
+from chaosgym.series import zero_one_statistic
 
 beam = chaosgym.ImpactBeam(n_modes=5, fitted_modes=0)
 calm = replace(beam, excitation_frequency=20.0)

@@ -14,18 +14,19 @@ import chaosgym.envs  # noqa: F401  (registers the environments)
 from chaosgym.version import __version__
 
 if TYPE_CHECKING:
+    from chaosgym.branches.diagram_search import follow
     from chaosgym.classifier import MachineClassifier, ResponseClassifier, classifier_for, default_classifier
     from chaosgym.control.evaluation import evaluate
     from chaosgym.control.operator import Operator
-    from chaosgym.diagnosis import Diagnosis, diagnose, response_map, response_type, two_step_test
-    from chaosgym.diagnosis.diagram_search import follow
-    from chaosgym.diagnosis.measured import judge_peaks
+    from chaosgym.diagnosis import diagnose, response_map, response_type
     from chaosgym.diagnosis.step_check import step_check
     from chaosgym.errors import ChaosgymError, ParameterError, SimulationError
     from chaosgym.machines import THESIS_SLIDER_CRANK, ImpactBeam, SliderCrank
     from chaosgym.machines.modal_machine import Drive, Joint, ModalMachine, Structure, machine_with_joints, read_machine
-    from chaosgym.monitor import Monitor
-    from chaosgym.signals.read import read_recording
+    from chaosgym.recordings.judge import judge_peaks
+    from chaosgym.recordings.monitor import Monitor
+    from chaosgym.recordings.read import read_recording
+    from chaosgym.series import Diagnosis, two_step_test
     from chaosgym.simulation import CycleRecord, ExactEvents, RungeKutta4, simulate, simulate_many
     from chaosgym.sweeps import Axis, SweepPlan, read_sweep, run_sweep
 
@@ -33,9 +34,9 @@ _HOME = {
     "chaosgym.classifier": ("MachineClassifier", "ResponseClassifier", "classifier_for", "default_classifier"),
     "chaosgym.control.evaluation": ("evaluate",),
     "chaosgym.control.operator": ("Operator",),
-    "chaosgym.diagnosis": ("Diagnosis", "diagnose", "response_map", "response_type", "two_step_test"),
-    "chaosgym.diagnosis.diagram_search": ("follow",),
-    "chaosgym.diagnosis.measured": ("judge_peaks",),
+    "chaosgym.diagnosis": ("diagnose", "response_map", "response_type"),
+    "chaosgym.branches.diagram_search": ("follow",),
+    "chaosgym.recordings.judge": ("judge_peaks",),
     "chaosgym.diagnosis.step_check": ("step_check",),
     "chaosgym.errors": ("ChaosgymError", "ParameterError", "SimulationError"),
     "chaosgym.machines": ("THESIS_SLIDER_CRANK", "ImpactBeam", "SliderCrank"),
@@ -47,8 +48,9 @@ _HOME = {
         "machine_with_joints",
         "read_machine",
     ),
-    "chaosgym.monitor": ("Monitor",),
-    "chaosgym.signals.read": ("read_recording",),
+    "chaosgym.recordings.monitor": ("Monitor",),
+    "chaosgym.recordings.read": ("read_recording",),
+    "chaosgym.series": ("Diagnosis", "two_step_test"),
     "chaosgym.simulation": ("CycleRecord", "ExactEvents", "RungeKutta4", "simulate", "simulate_many"),
     "chaosgym.sweeps": ("Axis", "SweepPlan", "read_sweep", "run_sweep"),
 }

@@ -17,10 +17,10 @@ from chaosgym.control.controllers import BackOff, Follow
 from chaosgym.control.policies import TrainedPolicy, save_policy
 from chaosgym.control.policies.export import exported
 from chaosgym.control.rollout import Played, Policy, play
-from chaosgym.diagnosis import two_step_test
 from chaosgym.errors import ChaosgymError, DatasetError
 from chaosgym.files import write_atomically
 from chaosgym.machines import ImpactBeam
+from chaosgym.series import two_step_test
 from chaosgym.simulation import CycleRecord, simulate
 from chaosgym.sweeps import Axis, LabelledSweep, SweepPlan, run_sweep
 

@@ -11,8 +11,8 @@ from chaosgym.classifier.features import (
     record_amplitude,
     repeat_period,
 )
-from chaosgym.diagnosis.stroboscopic import noisy_class_residuals
 from chaosgym.errors import DiagnosisError
+from chaosgym.series.stroboscopic import noisy_class_residuals
 from tests.classifier.made_up import record_features, settled
 
 

@@ -12,8 +12,8 @@ import pytest
 
 from chaosgym.simulation import simulate
 from tests.cli.run import run
-from tests.diagnosis.records import KINDS, make
 from tests.plain_modes import HARD_BEAM
+from tests.recordings.records import KINDS, make
 
 COMMANDS = (("diagnose",), ("classify", "impact-beam"), ("design", "--load-rating", "0.5 kN"))
 
@@ -433,7 +433,7 @@ def test_a_record_beside_a_machine_is_refused_in_one_line(arguments, message):
 
 def test_a_recording_that_takes_long_shows_a_sign_of_life(tmp_path, monkeypatch):
     """The reader says after a while that it goes on."""
-    from chaosgym.signals import read
+    from chaosgym.recordings import read
 
     def slow(source, found=read.read_recording):
         time.sleep(1.0)

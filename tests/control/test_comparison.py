@@ -16,10 +16,10 @@ from chaosgym.control.policies import TrainedPolicy
 from chaosgym.control.policies.network import Dense, Network
 from chaosgym.control.rollout import play
 from chaosgym.control.scores import ONE, ZERO, Scores, table_lines
-from chaosgym.design.rating_life import LIFE_EXPONENT
 from chaosgym.envs import SB3VecEnv
 from chaosgym.envs.vector_env import native_envs
 from chaosgym.errors import DatasetError, ModelFileError, ParameterError
+from chaosgym.rating_life import LIFE_EXPONENT
 
 BEAM = "chaosgym/ImpactBeamTolerance-v1"
 

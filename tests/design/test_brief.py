@@ -12,7 +12,7 @@ from chaosgym.design.measured import evaluate_peaks
 from chaosgym.diagnosis import Tolerance, default_tolerances
 from chaosgym.errors import DesignError, ParameterError
 from chaosgym.machines import MACHINES, ImpactBeam
-from chaosgym.machines.units import parse_quantity
+from chaosgym.units import parse_quantity
 
 EXAMPLES = Path(__file__).parents[2] / "docs" / "examples"
 

@@ -1,19 +1,15 @@
 import numpy as np
 import pytest
 
-from chaosgym.diagnosis import (
-    exponent_from_series,
-    find_periodic_orbit,
-    largest_lyapunov_exponent,
-)
-from chaosgym.diagnosis.lyapunov import average_growth
+from chaosgym.diagnosis import find_periodic_orbit, largest_lyapunov_exponent
 from chaosgym.errors import DiagnosisError
 from chaosgym.machines import ImpactBeam, SliderCrank
+from chaosgym.series import exponent_from_series
+from chaosgym.series.exponent import average_growth
 from chaosgym.simulation import RungeKutta4, simulate
+from tests.diagnosis.two_trajectories import two_trajectory_exponent
 from tests.plain_modes import PLAIN_BEAM
-
-from .maps import GOLDEN, circle, henon, logistic
-from .two_trajectories import two_trajectory_exponent
+from tests.series.maps import GOLDEN, circle, henon, logistic
 
 
 @pytest.mark.parametrize(

@@ -5,8 +5,7 @@ from chaosgym.diagnosis import compare_attractors, compare_outcomes, diagnose, m
 from chaosgym.diagnosis.matrix_update import neighbouring_interval
 from chaosgym.errors import DiagnosisError
 from chaosgym.machines import ImpactBeam, SliderCrank
-
-from .maps import logistic
+from tests.series.maps import logistic
 
 
 def test_one_periodic_motion_seen_twice_is_periodic_in_both_forms():

@@ -4,13 +4,13 @@ import numpy as np
 import pytest
 
 from benchmarks.agreement import random_machines
-from chaosgym.diagnosis import diagnose, find_periodic_orbit, two_step_test
+from chaosgym.diagnosis import diagnose, find_periodic_orbit
 from chaosgym.machines import ImpactBeam
+from chaosgym.series import two_step_test
 from chaosgym.simulation import simulate
+from tests.diagnosis.oscillators import RigidImpact, duffing, iterate
+from tests.diagnosis.two_trajectories import two_trajectory_exponent
 from tests.plain_modes import PLAIN_BEAM
-
-from .oscillators import RigidImpact, duffing, iterate
-from .two_trajectories import two_trajectory_exponent
 
 SHAW_HOLMES = RigidImpact(frequency=2.4, damping=0.02, restitution=0.8, gap=0.0)
 

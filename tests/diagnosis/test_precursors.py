@@ -3,17 +3,11 @@ from dataclasses import replace
 
 import pytest
 
-from chaosgym.diagnosis import (
-    bounce_fraction,
-    diagnose,
-    precursors,
-    predictive_criteria,
-    signs_of_chaos,
-    two_step_test,
-)
+from chaosgym.diagnosis import bounce_fraction, diagnose, precursors, predictive_criteria, signs_of_chaos
 from chaosgym.diagnosis.precursors import measured_rates
 from chaosgym.errors import DiagnosisError
 from chaosgym.machines import ImpactBeam
+from chaosgym.series import two_step_test
 from chaosgym.simulation import simulate
 
 

@@ -8,7 +8,7 @@ from click.testing import CliRunner
 
 from chaosgym import Drive, ModalMachine, Structure, diagnose
 from chaosgym.cli import app
-from chaosgym.diagnosis.lyapunov import average_growth
+from chaosgym.series.exponent import average_growth
 
 
 def machine(frequencies, ratios, force, speed, gap=1.0, **fields):

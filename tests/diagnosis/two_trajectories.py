@@ -5,7 +5,9 @@ from collections.abc import Callable
 import numpy as np
 from numpy.typing import ArrayLike
 
-from chaosgym.diagnosis.lyapunov import DISTANCE, Array, LyapunovExponent, _any_direction, average_growth
+from chaosgym.arrays import Array
+from chaosgym.diagnosis.lyapunov import DISTANCE, _any_direction
+from chaosgym.series.exponent import LyapunovExponent, average_growth
 
 
 def two_trajectory_exponent(

@@ -15,14 +15,14 @@ from scipy.sparse import csc_matrix
 
 import chaosgym
 from chaosgym import Drive, ImpactBeam, ModalMachine, Structure, simulate
+from chaosgym.branches.family_along import continuous_field
 from chaosgym.cli import app
 from chaosgym.design import variation_region
 from chaosgym.design.brief import brief_from
 from chaosgym.diagnosis import Tolerance
-from chaosgym.diagnosis.family_along import continuous_field
-from chaosgym.diagnosis.model_draws import fields_to_estimate
 from chaosgym.envs.variants import Variants
 from chaosgym.errors import ChaosgymError, ParameterError
+from chaosgym.fit.model_draws import fields_to_estimate
 from chaosgym.machines.beam_element import bending_matrices
 from chaosgym.machines.impact_beam.modes import modal_analysis
 from chaosgym.machines.machine_file import schema_text, template

@@ -7,8 +7,8 @@ import numpy as np
 import pytest
 
 from chaosgym.errors import ParameterError
-from chaosgym.machines.numbers import number, numbers, shown
-from chaosgym.machines.units import parse_row
+from chaosgym.numbers import number, numbers, shown
+from chaosgym.units import parse_row
 
 
 def refused(call, *arguments, **keywords):

@@ -12,7 +12,7 @@ import chaosgym
 from chaosgym.cli import app
 from chaosgym.errors import ParameterError
 from chaosgym.machines.modal_machine.turning import turning_joints
-from chaosgym.machines.units import ALTERNATIVES, TURNING, parse_quantity, parse_row
+from chaosgym.units import ALTERNATIVES, TURNING, parse_quantity, parse_row
 
 TORSIONAL = """
 [structure]

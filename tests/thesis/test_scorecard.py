@@ -6,8 +6,8 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from chaosgym.diagnosis import two_step_test
 from chaosgym.machines.slider_crank.equations import equations
+from chaosgym.series import two_step_test
 from chaosgym.simulation import simulate
 from tests.plain_modes import HARD_BEAM, PLAIN_BEAM, PLAIN_CRANK
 from thesis.scorecard.beam_runs import bouncing_shares, force_point_motion, long_run

@@ -12,10 +12,11 @@ from numpy.typing import NDArray
 
 from chaosgym.arrays import Array
 from chaosgym.design.peak_impacts import peak_impacts, worn_side
-from chaosgym.diagnosis import response_map, two_step_test
+from chaosgym.diagnosis import response_map
 from chaosgym.errors import SimulationError
 from chaosgym.machines import ImpactBeam, Machine
 from chaosgym.machines.parameters import with_settings
+from chaosgym.series import two_step_test
 from chaosgym.simulation import CycleRecord, parallel_map, simulate
 from thesis.scorecard.beam_runs import follow_modes
 from thesis.scorecard.observation import READING_ERROR, THOROUGH, observe, plotted_peaks, read_dots

@@ -5,9 +5,10 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from chaosgym.diagnosis import Nature, predictive_criteria
+from chaosgym.diagnosis import predictive_criteria
 from chaosgym.errors import DiagnosisError
 from chaosgym.machines import Machine
+from chaosgym.series import Nature
 
 
 @dataclass(frozen=True)

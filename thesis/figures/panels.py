@@ -10,9 +10,9 @@ from matplotlib.axes import Axes
 from chaosgym.arrays import Array
 from chaosgym.design.peak_impacts import PeakImpactDiagram
 from chaosgym.design.statistics import histogram
-from chaosgym.diagnosis import power_spectrum
 from chaosgym.plotting.design import impact_diagram
 from chaosgym.plotting.style import ACCENT, BAD
+from chaosgym.series import power_spectrum
 from thesis import plotting as thesis
 from thesis.figures.computations import Data
 from thesis.figures.figure import Finding, Panel, Parts

@@ -7,10 +7,10 @@ import numpy as np
 import scipy.signal
 
 from chaosgym.arrays import Array
-from chaosgym.diagnosis import two_step_test
-from chaosgym.diagnosis.stroboscopic import find_recurrence, scales
 from chaosgym.machines import ImpactBeam, Machine
 from chaosgym.machines.impact_beam.modes import modal_analysis
+from chaosgym.series import two_step_test
+from chaosgym.series.stroboscopic import find_recurrence, scales
 from chaosgym.simulation import CycleRecord, simulate
 from thesis.scorecard.observation import DOT, READING_ERROR, initial_state, plotted_peaks
 

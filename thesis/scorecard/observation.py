@@ -13,10 +13,11 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from chaosgym.arrays import Array
-from chaosgym.diagnosis import Diagnosis, diagnose, two_step_test
-from chaosgym.diagnosis.stroboscopic import MIN_REPEATS, class_residuals, irregularity
+from chaosgym.diagnosis import diagnose
 from chaosgym.errors import SimulationError
 from chaosgym.machines import ImpactBeam, Machine
+from chaosgym.series import Diagnosis, two_step_test
+from chaosgym.series.stroboscopic import MIN_REPEATS, class_residuals, irregularity
 from chaosgym.simulation import CycleRecord, MotionState, simulate
 
 READING_ERROR = 0.5

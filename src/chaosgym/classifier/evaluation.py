@@ -12,7 +12,7 @@ from chaosgym.classifier.data import Examples
 from chaosgym.classifier.estimator import ResponseClassifier
 from chaosgym.classifier.features import least_scatter
 from chaosgym.classifier.machine_classifier import IRREGULAR, NATURE
-from chaosgym.diagnosis.stroboscopic import irregularity
+from chaosgym.series.stroboscopic import irregularity
 
 RESAMPLES = 1000
 LEVEL = 0.95

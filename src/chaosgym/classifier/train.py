@@ -26,9 +26,9 @@ from chaosgym.classifier.estimator import ResponseClassifier
 from chaosgym.classifier.evaluation import score_records, score_stages
 from chaosgym.classifier.features import MAX_CYCLES, MIN_CYCLES
 from chaosgym.classifier.machine_classifier import IRREGULAR, NATURE, MachineClassifier
-from chaosgym.diagnosis.stroboscopic import irregularity
 from chaosgym.errors import DatasetError
 from chaosgym.machines.parameters import parameters_of
+from chaosgym.series.stroboscopic import irregularity
 from chaosgym.sweeps import LabelledSweep
 from chaosgym.version import __version__
 

@@ -69,11 +69,11 @@ def branch(
     }
     found: Any
     if against is None:
-        from chaosgym.diagnosis.diagram_search import SWEEP, follow
+        from chaosgym.branches.diagram_search import SWEEP, follow
 
         found = follow(machine, first.field, (first.low, first.high), sweep=first.count or SWEEP, **limits)
     else:
-        from chaosgym.diagnosis.bifurcation_map import COLUMNS, ROWS, bifurcation_map
+        from chaosgym.branches.bifurcation_map import COLUMNS, ROWS, bifurcation_map
 
         second = _axis(machine, against)
         found = bifurcation_map(
@@ -88,7 +88,7 @@ def branch(
         )
     result, lines = found.as_dict(), _lines(found) if against is None else _map_lines(found)
     if against is None:
-        from chaosgym.diagnosis.route_to_chaos import routes_to_chaos
+        from chaosgym.branches.route_to_chaos import routes_to_chaos
 
         routes = routes_to_chaos(found)
         result["routes"] = [one.as_dict() for one in routes]
@@ -108,7 +108,7 @@ def branch(
 
 def _axis(machine: Any, text: str) -> Any:
     """Field and range of "FIELD=LOW:HIGH[:COUNT]"."""
-    from chaosgym.diagnosis.family_along import continuous_field
+    from chaosgym.branches.family_along import continuous_field
     from chaosgym.machines.parameters import parameters_of
     from chaosgym.sweeps import Axis
 

@@ -78,7 +78,7 @@ def classify(
     if plot and not measured:
         raise click.UsageError("--plot goes with --peaks or --series; `chaosgym diagnose` draws a machine")
     if follow:
-        from chaosgym.signals.stream import LineReader
+        from chaosgym.recordings.stream import LineReader
 
         reader = LineReader(measured.column, delimiter, measured.unit, measured.scale)
         return _follow(sys.stdin, reader, half_width, log, timeout_s, as_json)
@@ -124,7 +124,7 @@ def _bars(chances: dict[str, float]) -> list[str]:
 
 def _half_width(measured: Measured, follow: bool) -> float | None:
     """Half width [N] of the stated error; None if none is stated."""
-    from chaosgym.signals.noise import stated_error
+    from chaosgym.series.noise import stated_error
 
     told = stated_error(measured.sensor_error, measured.sensor_sigma)
     if told is not None and not (measured or follow):
@@ -211,8 +211,8 @@ def _follow(
 ) -> None:
     """Print a verdict each cycle, and a line for every event; what is no reading is counted, warned of and survived."""
     from chaosgym.errors import DiagnosisError
-    from chaosgym.monitor import LONGEST, EventLog, Monitor
-    from chaosgym.signals.stream import stalls
+    from chaosgym.recordings.monitor import LONGEST, EventLog, Monitor
+    from chaosgym.recordings.stream import stalls
 
     monitor = Monitor(sensor_error, longest_period=LONGEST)
     with EventLog(log) as events:

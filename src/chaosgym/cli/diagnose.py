@@ -166,13 +166,12 @@ def _sweep_lines(told: dict[str, Any], found: Any) -> list[str]:
 
 def _two_step(machine: Any, budget: int, sensor_error: float) -> tuple[dict[str, Any], list[str], Any]:
     """Both steps of the Two-Step Test on one run from rest."""
-    from dataclasses import replace
-
-    from chaosgym.diagnosis import two_step_test
+    from chaosgym.diagnosis.verdict import of_machine
+    from chaosgym.series import two_step_test
     from chaosgym.simulation import simulate
 
     record = simulate(machine, budget)
-    verdict = replace(two_step_test(record, sensor_error=sensor_error), record=record)
+    verdict = of_machine(two_step_test(record, sensor_error=sensor_error), record=record)
     told, forces = _forces(machine, verdict)
     result = {"machine": machine.name, **verdict.as_dict(), **told, "warnings": []}
     lines = verdict_lines(f"{machine.name}, Two-Step Test", verdict, forces)
@@ -259,7 +258,7 @@ def _add_margins(
     machine: Any, verdict: Any, reach: float, kicks: int, result: dict[str, Any], lines: list[str]
 ) -> None:
     """Add the margins of a certified orbit, or why there are none."""
-    from chaosgym.diagnosis.margins import margins_of
+    from chaosgym.branches.margins import margins_of
 
     found = margins_of(machine, verdict, reach=reach, kicks=kicks)
     if found is None:
@@ -305,7 +304,7 @@ def overlay(machine: Any, measured: Measured, out: Path, as_json: bool) -> None:
     """Lay a measured record over what a machine does: peaks, their distribution and their section."""
     if not measured:
         raise click.UsageError("give what was measured: --peaks FILE or --series FILE")
-    from chaosgym.diagnosis.overlay import overlay as compare
+    from chaosgym.fit.overlay import overlay as compare
     from chaosgym.plotting.commands import overlay_figure
     from chaosgym.plotting.style import check_picture, save_picture
 

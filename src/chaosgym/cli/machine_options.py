@@ -35,7 +35,7 @@ class Quantity(click.ParamType):  # type: ignore[type-arg]
 
     def convert(self, value: Any, param: click.Parameter | None, ctx: click.Context | None) -> float:
         """Return the number in the option's unit."""
-        from chaosgym.machines.units import parse_option, units_of
+        from chaosgym.units import parse_option, units_of
 
         if not isinstance(value, str):
             return float(value)
@@ -60,7 +60,7 @@ class FloatRange(click.FloatRange):
 
 def millimetres_meant(field: str, written: str, value: float, usual: float) -> str:
     """Doubt about a bare number in metres that looks like millimetres; empty if there is none."""
-    from chaosgym.machines.units import looks_like_millimetres
+    from chaosgym.units import looks_like_millimetres
 
     if not written[-1:].isdigit() or not looks_like_millimetres(value, usual):
         return ""
@@ -241,7 +241,7 @@ def _checked(owner: Any, option: str, number: Number, value: float) -> float:
 def _setting(owner: Any, text: str) -> tuple[str, Any, str]:
     """Parse FIELD=VALUE, where a number may have a unit: (field, value, a doubt about it)."""
     from chaosgym.machines.parameters import field_named, parameters_of
-    from chaosgym.machines.units import parse_option
+    from chaosgym.units import parse_option
 
     field, separator, value = text.partition("=")
     field = field_named(owner, field)

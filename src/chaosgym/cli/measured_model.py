@@ -21,11 +21,11 @@ def compared(machine: Any, measured: Measured, estimate: Sequence[str]) -> tuple
     """
     import numpy as np
 
-    from chaosgym.diagnosis.measured import judge_peaks
-    from chaosgym.diagnosis.model_draws import fields_to_estimate
-    from chaosgym.diagnosis.model_fit import model_fit, with_record
     from chaosgym.errors import DiagnosisError
-    from chaosgym.signals.noise import stated_error
+    from chaosgym.fit.model_draws import fields_to_estimate
+    from chaosgym.fit.model_fit import model_fit, with_record
+    from chaosgym.recordings.judge import judge_peaks
+    from chaosgym.series.noise import stated_error
 
     fields_to_estimate(machine, estimate)
     told = stated_error(measured.sensor_error, measured.sensor_sigma)

@@ -22,7 +22,7 @@ class Reading(Quantity):
 
     def convert(self, value: Any, param: click.Parameter | None, ctx: click.Context | None) -> float:
         """Return newton, or an ``InUnit``."""
-        from chaosgym.signals.columns import OTHERS
+        from chaosgym.recordings.columns import OTHERS
 
         number, _, unit = value.strip().rpartition(" ") if isinstance(value, str) else ("", "", "")
         if unit not in OTHERS:
@@ -161,11 +161,11 @@ def measured_runs(given: Measured, *, several: bool = False, of_force: bool = Fa
     DiagnosisError
         If nothing can be judged, or readings are no forces where ``of_force`` asks for them.
     """
-    from chaosgym.diagnosis.measured import judge_peaks
     from chaosgym.errors import DiagnosisError
-    from chaosgym.signals.columns import check_peaks, choose_force, forces, named_columns
-    from chaosgym.signals.cycles import cycle_period, peaks_of_series
-    from chaosgym.signals.read import read_recording
+    from chaosgym.recordings.columns import check_peaks, choose_force, forces, named_columns
+    from chaosgym.recordings.cycles import cycle_period, peaks_of_series
+    from chaosgym.recordings.judge import judge_peaks
+    from chaosgym.recordings.read import read_recording
 
     recording = read_recording(given.peaks or given.series or "-")
     found = []
@@ -251,10 +251,10 @@ def measured_sweep(source: str, speed: str | None, given: Measured) -> tuple[Any
     """Read and judge peaks at many speeds: speeds, peaks, their types, and where they come from."""
     import numpy as np
 
-    from chaosgym.diagnosis.measured_sweep import sweep_types
     from chaosgym.errors import DiagnosisError
-    from chaosgym.signals.columns import check_peaks, choose_force, choose_speed
-    from chaosgym.signals.read import read_recording
+    from chaosgym.recordings.columns import check_peaks, choose_force, choose_speed
+    from chaosgym.recordings.measured_sweep import sweep_types
+    from chaosgym.recordings.read import read_recording
 
     recording = read_recording(source)
     at = choose_speed(recording, speed)

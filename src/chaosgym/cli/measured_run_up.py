@@ -20,9 +20,9 @@ def judged_run_up(given: Measured, orders: float | None) -> tuple[Any, str, str,
     DiagnosisError
         If the recording can't be judged.
     """
-    from chaosgym.diagnosis.run_up import HIGHEST_ORDER, run_up
-    from chaosgym.signals.cycles import series_of
-    from chaosgym.signals.read import read_recording
+    from chaosgym.recordings.cycles import series_of
+    from chaosgym.recordings.read import read_recording
+    from chaosgym.recordings.run_up import HIGHEST_ORDER, run_up
 
     if not (given.series and given.tachometer):
         raise click.UsageError("--run-up needs --series FILE --tachometer NAME")

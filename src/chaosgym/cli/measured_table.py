@@ -74,7 +74,7 @@ def _together(runs: list[Run]) -> Any:
     """The verdict on all channels of a file of peaks, which are the sensors of one machine; else None."""
     import numpy as np
 
-    from chaosgym.diagnosis.sensors import judge_together
+    from chaosgym.recordings.sensors import judge_together
 
     if len(runs) < 2 or not all(run.aligned for run in runs) or len({len(run.peaks) for run in runs}) > 1:
         return None

@@ -78,7 +78,7 @@ def sweep(
     if routes and (kind != "grid" or len(chosen) != 1):
         raise click.UsageError("--routes needs a grid of one axis: --axis FIELD=LOW:HIGH:COUNT once")
     if routes:
-        from chaosgym.diagnosis.family_along import continuous_field
+        from chaosgym.branches.family_along import continuous_field
 
         continuous_field(machine, chosen[0].field)  # refused before the sweep, not after
     for text in axes:
@@ -115,7 +115,7 @@ def sweep(
 
 def _routes(plan: Any, labelled: Any) -> tuple[dict[str, Any], list[str]]:
     """Routes to chaos and crises along the one axis: for JSON, and as lines."""
-    from chaosgym.diagnosis.route_to_chaos import routes_in_sweep
+    from chaosgym.branches.route_to_chaos import routes_in_sweep
 
     (field,) = plan.fields
     values, natures = labelled.column(field).tolist(), [str(one) for one in labelled.column("nature")]

@@ -13,11 +13,11 @@ from numpy.typing import NDArray
 from tqdm import tqdm
 
 from chaosgym.arrays import Array
-from chaosgym.design.rating_life import damage_in_a_million
 from chaosgym.envs.observation import OBSERVATION_NAMES
 from chaosgym.envs.task import Task
 from chaosgym.envs.vector_env import native_envs
 from chaosgym.machines.parameters import parameters_of
+from chaosgym.rating_life import damage_in_a_million
 
 SETTLING_CYCLES, JUDGED_CYCLES = 30, 40
 """Cycles at a speed before the motion is judged, and while it is."""

@@ -18,8 +18,8 @@ from numpy.typing import NDArray
 
 from chaosgym.arrays import Array
 from chaosgym.control.statistics import bootstrap_interval, paired_difference, performance_profile
-from chaosgym.design.rating_life import LIFE_EXPONENT
 from chaosgym.errors import ParameterError
+from chaosgym.rating_life import LIFE_EXPONENT
 
 ZERO, ONE = "follow the demand", "own map"
 """Contenders that are worth 0 and 1."""

@@ -21,8 +21,8 @@ from chaosgym.design.reliability import (
 from chaosgym.diagnosis import Tolerance
 from chaosgym.errors import ParameterError
 from chaosgym.machines import Machine
-from chaosgym.machines.numbers import shown
 from chaosgym.machines.parameters import by_field, parameter, validate
+from chaosgym.numbers import shown
 
 _STEEL = "hardened steel, surface endurance strength 2.76 HB - 70 MPa at 600 HB (Shigley)"
 

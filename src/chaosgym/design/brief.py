@@ -34,9 +34,9 @@ from chaosgym.diagnosis import Tolerance, default_tolerances
 from chaosgym.errors import DesignError
 from chaosgym.files import toml_of
 from chaosgym.machines import FILE_ENDING, MACHINES, Machine
-from chaosgym.machines.numbers import shown
 from chaosgym.machines.parameters import parameters_of, with_settings
-from chaosgym.machines.units import parse_quantity
+from chaosgym.numbers import shown
+from chaosgym.units import parse_quantity
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -12,10 +12,10 @@ from chaosgym.design.wear import Wear, read_wear, worn_clearances
 from chaosgym.diagnosis import Tolerance, default_tolerances
 from chaosgym.errors import DesignError
 from chaosgym.machines import MACHINES, Machine
-from chaosgym.machines.numbers import shown
 from chaosgym.machines.parameters import by_field, parameters_of, suggestion, with_settings
 from chaosgym.machines.stated import flat
-from chaosgym.machines.units import parse_quantity, parse_row, units_of
+from chaosgym.numbers import shown
+from chaosgym.units import parse_quantity, parse_row, units_of
 
 BY_FIELD = ("parameters", "tolerances", "changes", "costs")
 """Sections whose keys are fields of the machine."""

@@ -31,10 +31,11 @@ from chaosgym.design.fatigue import equivalent_force
 from chaosgym.design.guidelines import case_of
 from chaosgym.design.methodology import Assessment
 from chaosgym.design.runs import SettledRun, deviating, worse_side
-from chaosgym.diagnosis import Nature, Neighbour, Tolerance, Type
+from chaosgym.diagnosis import Neighbour, Tolerance
 from chaosgym.diagnosis.type_rule import FORCE_CHANGE
 from chaosgym.errors import SimulationError
 from chaosgym.machines import Machine
+from chaosgym.series import Nature, Type
 from chaosgym.simulation import parallel_map, simulate
 
 BASE = 64

@@ -26,9 +26,9 @@ import rainflow
 from numpy.typing import ArrayLike
 
 from chaosgym.arrays import Array
-from chaosgym.design.rating_life import LIFE_EXPONENT, damage_in_a_million
 from chaosgym.design.statistics import as_forces
 from chaosgym.errors import DesignError
+from chaosgym.rating_life import LIFE_EXPONENT, damage_in_a_million
 
 CUBIC_EXPONENT = 3.0
 """Exponent of figure 5.12 and of the 25 % criterion (5.5.2), point contact."""

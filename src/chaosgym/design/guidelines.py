@@ -14,9 +14,10 @@ from typing import Literal, NamedTuple
 
 from chaosgym.design.methodology import Assessment
 from chaosgym.design.told import listed
-from chaosgym.diagnosis import Neighbour, Type, signs_of_chaos
+from chaosgym.diagnosis import Neighbour, signs_of_chaos
 from chaosgym.diagnosis.precursors import measured_rates
 from chaosgym.diagnosis.type_rule import FORCE_CHANGE, mixed
+from chaosgym.series import Type
 
 Case = Literal["I", "II", "II throughout", "III", "undetermined"]
 

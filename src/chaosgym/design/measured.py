@@ -12,9 +12,9 @@ from chaosgym.arrays import Array
 from chaosgym.design.bearing import Criteria, Evaluation, evaluate, plain
 from chaosgym.design.reliability import time_blocks
 from chaosgym.design.statistics import Convergence, Histogram, as_forces, convergence, histogram, require_enough
-from chaosgym.diagnosis.measured import judge_peaks
-from chaosgym.diagnosis.response import MeasuredVerdict
 from chaosgym.errors import DesignError
+from chaosgym.recordings.judge import judge_peaks
+from chaosgym.recordings.measured_verdict import MeasuredVerdict
 
 STRENGTH = ("strength", "strength_deviation", "contact_radius", "contact_modulus")
 """Criteria that a reliability rests on; without them it is left out."""

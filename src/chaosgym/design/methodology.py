@@ -35,9 +35,10 @@ from chaosgym.design.statistics import Convergence, convergence
 from chaosgym.design.told import CRITERIA
 from chaosgym.design.trend import Trend, fit_trend
 from chaosgym.design.wear import Wear, WearLife, wear_life
-from chaosgym.diagnosis import Neighbour, ResponseType, Tolerance, Type, default_tolerances, diagnose, response_type
+from chaosgym.diagnosis import Neighbour, ResponseType, Tolerance, default_tolerances, diagnose, response_type
 from chaosgym.machines import Machine
 from chaosgym.machines.parameters import parameters_of
+from chaosgym.series import Type
 
 Verdict = Literal["meets", "fails", "undetermined"]
 

@@ -20,8 +20,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from chaosgym.arrays import Array
-from chaosgym.design.rating_life import LIFE_EXPONENT
 from chaosgym.errors import DesignError
+from chaosgym.rating_life import LIFE_EXPONENT
 from chaosgym.simulation import CycleRecord
 
 SECTIONS = 5

@@ -8,11 +8,13 @@ import numpy as np
 
 from chaosgym.arrays import Array
 from chaosgym.design.fatigue import equivalent_force
-from chaosgym.design.rating_life import LIFE_EXPONENT
 from chaosgym.design.statistics import convergence
-from chaosgym.diagnosis import Diagnosis, Nature, Neighbour, Tolerance, diagnose
+from chaosgym.diagnosis import Neighbour, Tolerance, diagnose
+from chaosgym.diagnosis.verdict import MachineDiagnosis
 from chaosgym.machines import Machine
 from chaosgym.machines.parameters import with_settings
+from chaosgym.rating_life import LIFE_EXPONENT
+from chaosgym.series import Nature
 from chaosgym.simulation import MotionState, parallel_map, rest_state, simulate
 
 SERIES_CYCLES = 200
@@ -77,7 +79,7 @@ class SettledRun:
 def settled_run(
     machine: Machine,
     *,
-    verdict: Diagnosis | None = None,
+    verdict: MachineDiagnosis | None = None,
     until_converged: bool = False,
     budget: int = DIAGNOSIS_BUDGET,
 ) -> SettledRun:

@@ -5,6 +5,7 @@ from typing import Any
 
 import numpy as np
 
+from chaosgym.branches.margins import Margins, margins_of
 from chaosgym.design.bearing import hours_of, plain
 from chaosgym.design.brief import DesignBrief
 from chaosgym.design.collective import assess_duty, damage_shares
@@ -26,7 +27,6 @@ from chaosgym.design.trends import (
     life_against,
 )
 from chaosgym.diagnosis import ResponseMap
-from chaosgym.diagnosis.margins import Margins, margins_of
 from chaosgym.errors import DesignError
 from chaosgym.machines import Machine
 from chaosgym.machines.parameters import quantity_of, with_settings

@@ -17,10 +17,10 @@ from chaosgym.arrays import Array
 from chaosgym.design.fatigue import CUBIC_EXPONENT, equivalent_force, relative_life
 from chaosgym.design.peak_impacts import peak_impacts, worn_side
 from chaosgym.design.runs import SettledRun, settled_run, worse_side
-from chaosgym.diagnosis import Nature
 from chaosgym.errors import DesignError
 from chaosgym.machines import Machine
 from chaosgym.machines.parameters import quantity_of, with_settings
+from chaosgym.series import Nature
 from chaosgym.simulation import parallel_map, simulate
 
 HISTORY_SAMPLES = 2880

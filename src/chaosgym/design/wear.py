@@ -25,10 +25,11 @@ from chaosgym.arrays import Array
 from chaosgym.design.runs import DIAGNOSIS_BUDGET
 from chaosgym.design.told import hours_told, life_told
 from chaosgym.design.trends import HISTORY_SAMPLES
-from chaosgym.diagnosis import Nature, diagnose
+from chaosgym.diagnosis import diagnose
 from chaosgym.errors import DesignError, ParameterError
 from chaosgym.machines import Machine
 from chaosgym.machines.parameters import parameter, parameters_of, validate, with_settings
+from chaosgym.series import Nature
 from chaosgym.simulation import MotionState, parallel_map, rest_state, simulate
 
 STEPS = 12

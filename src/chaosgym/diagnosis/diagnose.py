@@ -24,15 +24,17 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from chaosgym.arrays import Array
-from chaosgym.diagnosis.lyapunov import BLOCKS, Deviation, average_growth
+from chaosgym.diagnosis.lyapunov import Deviation
 from chaosgym.diagnosis.matrix_update import FIELD, depends_on_configuration, matrix_update_test, neighbouring_interval
 from chaosgym.diagnosis.periodic_orbit import PeriodicOrbit
 from chaosgym.diagnosis.proof import proven_orbit, returning_period
-from chaosgym.diagnosis.response import Diagnosis, Status
 from chaosgym.diagnosis.stage import Stage, not_periodic, periodic, periodic_within, votes, without_contact
-from chaosgym.diagnosis.two_step import two_step_test
+from chaosgym.diagnosis.verdict import MachineDiagnosis, of_machine
 from chaosgym.errors import DiagnosisError
 from chaosgym.machines import Machine
+from chaosgym.series.exponent import BLOCKS, average_growth
+from chaosgym.series.two_step import two_step_test
+from chaosgym.series.verdict import Diagnosis, Status
 from chaosgym.simulation import CycleRecord, ExactEvents, Integrator, MotionState, simulate
 
 EARLY = (16, 32)
@@ -66,7 +68,7 @@ def diagnose(
     budget: int = DEFAULT_BUDGET,
     sensor_error: float = 0.0,
     integrator: Integrator | None = None,
-) -> Diagnosis:
+) -> MachineDiagnosis:
     """Tell the nature of a machine's response, and how sure that is.
 
     Parameters
@@ -85,7 +87,7 @@ def diagnose(
 
     Returns
     -------
-    Diagnosis
+    MachineDiagnosis
         With status, horizon, settle cycle, the votes of all tests and the run itself. ``evidence`` holds the figures
         of the Two-Step Test, whether the machine was ``linear`` (nothing touched in the last half of the run),
         ``largest_lyapunov_exponent_per_cycle``, the ``orbit`` if one was found, ``largest_peak`` [N] of the settled
@@ -120,7 +122,7 @@ def diagnose_alone(
     budget: int = DEFAULT_BUDGET,
     sensor_error: float = 0.0,
     integrator: Integrator | None = None,
-) -> Diagnosis:
+) -> MachineDiagnosis:
     """``diagnose`` without the vote of the Matrix Update Test, which judges a machine by other machines."""
     if budget < FIRST_STAGE:
         raise DiagnosisError(f"budget = {budget} cycles is out of range; allowed: {FIRST_STAGE} or more")
@@ -137,7 +139,7 @@ def diagnose_alone(
     if stage.orbit is not None and verdict.status == "certified":
         settled = _on_orbit(machine, stage.orbit)
         evidence["largest_peak"] = float(np.max(settled.peak_force))
-    return replace(
+    return of_machine(
         verdict, votes=votes(stage), horizon=len(record), evidence=evidence, record=record, orbit_record=settled
     )
 
@@ -203,7 +205,7 @@ def _last_stage(
     return stage
 
 
-def _with_update_test(machine: Machine, verdict: Diagnosis) -> Diagnosis:
+def _with_update_test(machine: Machine, verdict: MachineDiagnosis) -> MachineDiagnosis:
     """Let the Matrix Update Test vote on a verdict, from the state in which the run ended."""
     interval = getattr(machine, FIELD)
     update = matrix_update_test(

@@ -10,7 +10,6 @@ updates of these matrices. Each update disturbs the motion a little, so the two 
                  runs that repeat are periodic even if they differ; two that do not repeat and part are chaotic.
 """
 
-from dataclasses import replace
 from functools import partial
 from typing import Any, Literal
 
@@ -18,11 +17,12 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from chaosgym.arrays import Array
-from chaosgym.diagnosis.response import Diagnosis, Nature
-from chaosgym.diagnosis.stroboscopic import as_samples, find_decay, find_recurrence, scales
+from chaosgym.diagnosis.verdict import MachineDiagnosis, of_machine
 from chaosgym.errors import DiagnosisError
 from chaosgym.machines import Machine
 from chaosgym.machines.parameters import parameters_of, with_settings
+from chaosgym.series.stroboscopic import as_samples, find_decay, find_recurrence, scales
+from chaosgym.series.verdict import Diagnosis, Nature
 from chaosgym.simulation import MotionState, simulate
 
 Form = Literal["literal", "attractors"]
@@ -54,7 +54,7 @@ def matrix_update_test(
     cycles: int = 100,
     tolerance: float = TOLERANCE,
     initial_state: MotionState | None = None,
-) -> Diagnosis:
+) -> MachineDiagnosis:
     """Judge a machine by two runs with different matrix-update intervals.
 
     Parameters
@@ -103,7 +103,7 @@ def matrix_update_test(
         compare = compare_attractors
     verdict = compare(*(run.peak_force for run in runs), tolerance=tolerance)
     evidence |= verdict.evidence
-    return replace(verdict, evidence=evidence, horizon=transient + cycles, record=runs[0])
+    return of_machine(verdict, evidence=evidence, horizon=transient + cycles, record=runs[0])
 
 
 def neighbouring_interval(interval: float) -> float:

@@ -9,7 +9,6 @@ from numpy.typing import ArrayLike, NDArray
 
 from chaosgym.arrays import Array
 from chaosgym.diagnosis.diagnose import diagnose
-from chaosgym.diagnosis.response import Diagnosis
 from chaosgym.diagnosis.response_type import (
     Tolerance,
     check_initial_states,
@@ -19,6 +18,7 @@ from chaosgym.diagnosis.response_type import (
     region_points,
 )
 from chaosgym.diagnosis.type_rule import Neighbour, judge_type
+from chaosgym.diagnosis.verdict import MachineDiagnosis
 from chaosgym.errors import DiagnosisError, SimulationError
 from chaosgym.machines import Machine
 from chaosgym.machines.parameters import with_settings
@@ -126,7 +126,7 @@ def response_map(
     def at_place(place: Place) -> Machine:
         return with_settings(machine, dict(zip(fields, place, strict=True)))
 
-    def judge(place: Place) -> Diagnosis | None:
+    def judge(place: Place) -> MachineDiagnosis | None:
         try:
             return diagnose(at_place(place), budget=budget, sensor_error=sensor_error)
         except (DiagnosisError, SimulationError):
@@ -174,7 +174,7 @@ def _moved(
     return _place(speed, clearance)
 
 
-def _neighbour(shares: Mapping[str, float], run: Diagnosis | None) -> Neighbour:
+def _neighbour(shares: Mapping[str, float], run: MachineDiagnosis | None) -> Neighbour:
     if run is None:
         return Neighbour(shares, "undetermined", np.nan)
     return Neighbour(shares, run.nature, run.evidence["largest_peak"])

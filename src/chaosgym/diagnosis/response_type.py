@@ -15,11 +15,12 @@ from typing import Any, Literal, NamedTuple
 import numpy as np
 
 from chaosgym.diagnosis.diagnose import diagnose
-from chaosgym.diagnosis.response import Diagnosis, Type
 from chaosgym.diagnosis.type_rule import FORCE_CHANGE, Neighbour, apart, judge_type
+from chaosgym.diagnosis.verdict import MachineDiagnosis
 from chaosgym.errors import DiagnosisError
 from chaosgym.machines import Machine
 from chaosgym.machines.parameters import by_field, parameters_of, with_settings
+from chaosgym.series.verdict import Type
 from chaosgym.simulation import MotionState, parallel_map, rest_state
 
 Window = Literal["parameters", "speed-clearance"]
@@ -90,7 +91,7 @@ class ResponseType:
 
     type: Type
     reason: str
-    centre: Diagnosis
+    centre: MachineDiagnosis
     largest_peak: float
     neighbours: tuple[Neighbour, ...] = field(repr=False)
     coexisting_peaks: tuple[float, ...]
@@ -129,7 +130,7 @@ def response_type(
     initial_states: int = 3,
     budget: int = 1600,
     sensor_error: float = 0.0,
-    centre: Diagnosis | None = None,
+    centre: MachineDiagnosis | None = None,
     workers: int | None = None,
 ) -> ResponseType:
     """Type of a machine's response over its tolerance neighbourhood.
@@ -239,7 +240,7 @@ def check_initial_states(initial_states: int) -> None:
         raise DiagnosisError(f"initial_states = {initial_states!r} is out of range; allowed: 1, 2 or 3")
 
 
-def coexisting_peaks(machine: Machine, centre: Diagnosis, initial_states: int, budget: int) -> tuple[float, ...]:
+def coexisting_peaks(machine: Machine, centre: MachineDiagnosis, initial_states: int, budget: int) -> tuple[float, ...]:
     """Largest peak from each of the other initial states at a periodic centre [N]."""
     rest = rest_state(machine)
     reached = np.asarray(centre.evidence["final_state"])

@@ -5,10 +5,10 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from chaosgym.arrays import Array
-from chaosgym.diagnosis.lyapunov import LyapunovExponent
 from chaosgym.diagnosis.periodic_orbit import PeriodicOrbit
-from chaosgym.diagnosis.response import Diagnosis, Nature, Status
-from chaosgym.diagnosis.two_step import CHAOTIC_STATISTIC, QUASIPERIODIC_CYCLES, REGULAR_STATISTIC, two_step_test
+from chaosgym.series.exponent import LyapunovExponent
+from chaosgym.series.two_step import CHAOTIC_STATISTIC, QUASIPERIODIC_CYCLES, REGULAR_STATISTIC, two_step_test
+from chaosgym.series.verdict import Diagnosis, Nature, Status
 from chaosgym.simulation import CycleRecord
 
 GROWS = 1.05

@@ -16,8 +16,9 @@ from typing import Any
 import numpy as np
 
 from chaosgym.diagnosis.diagnose import DEFAULT_BUDGET, diagnose
-from chaosgym.diagnosis.response import Diagnosis, Nature
+from chaosgym.diagnosis.verdict import MachineDiagnosis
 from chaosgym.machines import Machine
+from chaosgym.series.verdict import Diagnosis, Nature
 from chaosgym.simulation import CycleRecord, Integrator
 
 SPREAD_CHANGE = 0.05
@@ -36,14 +37,14 @@ class StepCheck:
 
     Attributes
     ----------
-    given, finer : Diagnosis
+    given, finer : MachineDiagnosis
         Verdicts; the latter with the finest step tried.
     settled
         Whether the last two steps tried agree. If not, the machine's own verdict is undetermined.
     """
 
-    given: Diagnosis
-    finer: Diagnosis
+    given: MachineDiagnosis
+    finer: MachineDiagnosis
     settled: bool
 
     @property
@@ -115,7 +116,7 @@ def _end(verdict: Diagnosis) -> tuple[Nature, int | None]:
     return ("periodic" if verdict.transient else verdict.nature), verdict.period
 
 
-def _settled(verdict: Diagnosis) -> CycleRecord:
+def _settled(verdict: MachineDiagnosis) -> CycleRecord:
     """Cycles of what the motion settles on."""
     run = verdict.run
     settle = verdict.settle_cycle if verdict.transient and verdict.settle_cycle is not None else 0
@@ -135,7 +136,7 @@ def agree(one: Diagnosis, other: Diagnosis) -> bool:
 
 def step_check(
     machine: Machine,
-    given: Diagnosis | None = None,
+    given: MachineDiagnosis | None = None,
     *,
     budget: int = DEFAULT_BUDGET,
     sensor_error: float = 0.0,

@@ -28,8 +28,8 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from chaosgym.diagnosis.response import Type
 from chaosgym.errors import DiagnosisError
+from chaosgym.series.verdict import Type
 
 FORCE_CHANGE = 0.10
 """Change of the largest peak force that matters: a quarter of the fatigue life (thesis 5.5.2)."""

@@ -22,7 +22,7 @@ from chaosgym.envs.variants import DRAWN, Variants
 from chaosgym.errors import SimulationError
 from chaosgym.machines.batch import Cycles, KickedBatch, VaryingBatch
 from chaosgym.machines.machine import Machine
-from chaosgym.monitor import RepeatSums
+from chaosgym.recordings.monitor import RepeatSums
 
 Generators = Sequence[np.random.Generator]
 

@@ -8,7 +8,7 @@ from numpy.typing import NDArray
 
 from chaosgym.arrays import Array
 from chaosgym.envs.task import Task
-from chaosgym.monitor import HIGHEST, LIMIT
+from chaosgym.recordings.monitor import HIGHEST, LIMIT
 
 Observation = NDArray[np.float32]
 Generators = Sequence[np.random.Generator]
@@ -38,7 +38,7 @@ ASKED = {
     "drive": ("motor", "set_point"),
     "classifier": ("on", "irregular_probability"),
 }
-"""Entries that follow where a keyword has this value: the level of ``chaosgym.monitor``, an alarm above 1; the speed at
+"""Entries that follow where a keyword has this value: the level of the monitor, an alarm above 1; the speed at
 which the motor gives no torque; and how likely the machine's trained classifier of records holds the motion at this
 speed irregular."""
 

@@ -29,11 +29,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from chaosgym.arrays import Array
-from chaosgym.design.rating_life import damage_in_a_million
 from chaosgym.envs.kernels import steps
 from chaosgym.errors import ParameterError
 from chaosgym.machines.machine import Machine
 from chaosgym.machines.parameters import parameter, parameters_of, validate
+from chaosgym.rating_life import damage_in_a_million
 
 _number = partial(parameter, low=0.0, high=1e9, provenance="assumed")
 _count = partial(parameter, low=1, high=1e6, provenance="assumed")

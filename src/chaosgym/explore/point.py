@@ -10,13 +10,13 @@ import numpy as np
 
 from chaosgym.arrays import Array
 from chaosgym.classifier import classifier_for
-from chaosgym.diagnosis import Diagnosis, diagnose
+from chaosgym.diagnosis import MachineDiagnosis, diagnose
 from chaosgym.errors import ChaosgymError, ParameterError, SimulationError
 from chaosgym.machines import FILE_ENDING, MACHINES, Machine
 from chaosgym.machines.parameters import by_field, changes_of, parameters_of, with_settings
 from chaosgym.machines.picture import Sketch
-from chaosgym.monitor import Monitor
 from chaosgym.plotting.labels import axis_label
+from chaosgym.recordings.monitor import Monitor
 from chaosgym.simulation import simulate
 
 BUDGET = 400
@@ -199,7 +199,7 @@ def _check_cost(machine: Machine) -> None:
     )
 
 
-def _votes(verdict: Diagnosis) -> str:
+def _votes(verdict: MachineDiagnosis) -> str:
     peaks = verdict.judged.peak_force
     if not peaks.any():
         return "no contact at all: the gap is never closed"

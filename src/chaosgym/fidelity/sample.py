@@ -4,9 +4,9 @@ import numpy as np
 from scipy.stats import qmc
 
 from chaosgym.arrays import Array
-from chaosgym.diagnosis.two_step import two_step_test
 from chaosgym.errors import ParameterError
 from chaosgym.machines import Machine
+from chaosgym.series.two_step import two_step_test
 from chaosgym.simulation import simulate
 
 CHAOTIC_SHARE = 3

@@ -27,12 +27,12 @@ from scipy.stats import wasserstein_distance
 from chaosgym.arrays import Array
 from chaosgym.design.improve import not_dominated
 from chaosgym.diagnosis.response_type import SHARES, default_tolerances
-from chaosgym.diagnosis.two_step import two_step_test
 from chaosgym.diagnosis.type_rule import Neighbour, judge_type
 from chaosgym.errors import ChaosgymError
 from chaosgym.fidelity.sample import balanced_points
 from chaosgym.machines import Machine
 from chaosgym.machines.parameters import with_settings
+from chaosgym.series.two_step import two_step_test
 from chaosgym.simulation import CycleRecord, ExactEvents, Integrator, RungeKutta4, parallel_map, simulate
 
 REFERENCE = "reference"

@@ -72,7 +72,7 @@ class DriveTorque(NamedTuple):
         ParameterError
             If the swing is not a share above 0.
         """
-        from chaosgym.machines.numbers import number
+        from chaosgym.numbers import number
 
         number("swing", swing, LEAST_SWING, 2.0)
         return self.energy_swing / (swing * self.rate**2)

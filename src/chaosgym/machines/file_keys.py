@@ -6,9 +6,9 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from chaosgym.errors import ParameterError
-from chaosgym.machines.numbers import shown
 from chaosgym.machines.parameters import suggestion
-from chaosgym.machines.units import parse_quantity, parse_row, units_of
+from chaosgym.numbers import shown
+from chaosgym.units import parse_quantity, parse_row, units_of
 
 
 class Key(NamedTuple):

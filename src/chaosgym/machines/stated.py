@@ -7,7 +7,7 @@ from typing import Any, ClassVar, get_type_hints
 from chaosgym.errors import ParameterError
 from chaosgym.machines.machine import Machine
 from chaosgym.machines.parameters import by_field, check_parameter, parameters_of, suggestion
-from chaosgym.machines.units import parse_quantity
+from chaosgym.units import parse_quantity
 
 
 def class_with(base: type[Machine], defaults: Mapping[str, Any], attributes: Mapping[str, Any]) -> Any:

@@ -8,8 +8,8 @@ from matplotlib.colors import to_rgb
 from numpy.typing import NDArray
 
 from chaosgym.arrays import Array
-from chaosgym.diagnosis.bifurcation_diagram import BifurcationDiagram, Branch
-from chaosgym.diagnosis.bifurcation_map import BifurcationMap
+from chaosgym.branches.bifurcation_diagram import BifurcationDiagram, Branch
+from chaosgym.branches.bifurcation_map import BifurcationMap
 from chaosgym.plotting.labels import axis_label
 from chaosgym.plotting.style import ACCENT, BAD, INK, MUTED
 

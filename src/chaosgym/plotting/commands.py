@@ -14,20 +14,21 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from chaosgym.arrays import Array
+from chaosgym.branches.bifurcation_diagram import BifurcationDiagram
+from chaosgym.branches.bifurcation_map import BifurcationMap
 from chaosgym.design.measured import MeasuredPeaks
 from chaosgym.design.study import DesignStudy
-from chaosgym.diagnosis import Diagnosis
-from chaosgym.diagnosis.bifurcation_diagram import BifurcationDiagram
-from chaosgym.diagnosis.bifurcation_map import BifurcationMap
-from chaosgym.diagnosis.measured_sweep import SweepTypes
-from chaosgym.diagnosis.overlay import Overlay
-from chaosgym.diagnosis.run_up import RunUp
+from chaosgym.diagnosis.verdict import MachineDiagnosis
+from chaosgym.fit.overlay import Overlay
 from chaosgym.machines import Machine
 from chaosgym.plotting import response
 from chaosgym.plotting.branches import bifurcation_map, branches
 from chaosgym.plotting.design import cost_against_life, peak_record, series_life, type_map_around
 from chaosgym.plotting.labels import axis_label
 from chaosgym.plotting.style import ACCENT, INK, NATURE_COLOURS, STYLE, figure_of
+from chaosgym.recordings.measured_sweep import SweepTypes
+from chaosgym.recordings.run_up import RunUp
+from chaosgym.series import Diagnosis
 from chaosgym.simulation import CycleRecord, simulate
 
 WIDTH = 4.4
@@ -122,7 +123,7 @@ def simulation_figure(record: CycleRecord, transient: int = 0) -> Figure:
 
 
 @_styled
-def diagnosis_figure(verdict: Diagnosis) -> Figure:
+def diagnosis_figure(verdict: MachineDiagnosis) -> Figure:
     """Phase portrait with its stops and the stroboscopic section of the settled motion, and the peak forces."""
     judged = verdict.judged
     machine, colour = judged.machine, NATURE_COLOURS[verdict.nature]

@@ -15,10 +15,10 @@ from matplotlib.patches import Patch
 from numpy.typing import ArrayLike, NDArray
 
 from chaosgym.arrays import Array
-from chaosgym.diagnosis.measured_sweep import SweepTypes
 from chaosgym.errors import DatasetError
 from chaosgym.plotting.labels import axis_label
 from chaosgym.plotting.style import ACCENT, INK, MUTED, NATURE_COLOURS, PALE, STYLE, TYPE_COLOURS, figure_of
+from chaosgym.recordings.measured_sweep import SweepTypes
 from chaosgym.sweeps import LabelledSweep, SweepPlan
 
 

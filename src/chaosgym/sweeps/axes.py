@@ -9,7 +9,7 @@ import numpy as np
 
 from chaosgym.arrays import Array
 from chaosgym.errors import ParameterError
-from chaosgym.machines.units import parse_option
+from chaosgym.units import parse_option
 
 Scale = Literal["lin", "log"]
 SCALES: tuple[Scale, ...] = ("lin", "log")

@@ -9,10 +9,11 @@ from typing import Any
 
 import numpy as np
 
-from chaosgym.diagnosis import TYPES, default_tolerances
+from chaosgym.diagnosis import default_tolerances
 from chaosgym.errors import DatasetError
 from chaosgym.files import first_line, write_atomically
 from chaosgym.machines.parameters import changes_of, parameters_of
+from chaosgym.series import TYPES
 from chaosgym.sweeps.dataset import DAMAGE, DATA_FILE, LabelledSweep, read_sweep
 from chaosgym.sweeps.folder import CHUNK_FOLDER, PLAN_FILE, read_plan_file
 from chaosgym.sweeps.plan import SweepPlan

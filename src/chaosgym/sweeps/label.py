@@ -15,10 +15,10 @@ import pyarrow as pa
 from chaosgym.core.kernel_cache import source_digest
 from chaosgym.diagnosis import bounce_fraction, response_type
 from chaosgym.diagnosis.diagnose import diagnose_alone
-from chaosgym.diagnosis.stroboscopic import irregularity
 from chaosgym.diagnosis.type_rule import CROSS, type_of_cross, types_on_grid
 from chaosgym.errors import DiagnosisError, ParameterError, SimulationError, UnfinishedError
 from chaosgym.machines import Machine
+from chaosgym.series.stroboscopic import irregularity
 from chaosgym.simulation import CycleRecord, simulate
 from chaosgym.sweeps.dataset import SENSOR_ERROR, SIGNALS, WINDOW, WINDOWS, fixed_fields, schema, signal_columns
 from chaosgym.sweeps.plan import SweepPlan

@@ -33,7 +33,7 @@ from numpy.typing import NDArray
 
 from chaosgym.arrays import Array
 from chaosgym.control.controllers.controller import Controller, Observations, place_of, seen
-from chaosgym.design.rating_life import LIFE_EXPONENT
+from chaosgym.rating_life import LIFE_EXPONENT
 
 CONSTANT, POWER = 3.0, 2.0
 """Deviations a and b: the force within a factor of 20 of its mean, as speed^-2 to speed^2 (assumed)."""

@@ -13,9 +13,9 @@ from tqdm import trange
 
 from chaosgym.arrays import Array
 from chaosgym.control.controllers.controller import Controller, Observations, place_of, seen
-from chaosgym.design.rating_life import damage_in_a_million
 from chaosgym.envs.task import Task
 from chaosgym.envs.vector_env import native_envs
+from chaosgym.rating_life import damage_in_a_million
 
 CLASSES = 25
 """Classes of clearance, from the smallest to the largest that was met (assumed)."""

@@ -15,12 +15,12 @@ from numpy.typing import NDArray
 from chaosgym.arrays import Array
 from chaosgym.control.controllers.controller import Controller, Observations, place_of, seen
 from chaosgym.control.policies.network import Network
-from chaosgym.design.rating_life import damage_in_a_million
 from chaosgym.envs import environment
 from chaosgym.envs.levels import task_of
 from chaosgym.envs.memory import irregularity
 from chaosgym.envs.task import Task
 from chaosgym.errors import ModelFileError
+from chaosgym.rating_life import damage_in_a_million
 
 READINGS = ("mean peak", "scatter", "irregularity", "impacts", "bouncing")
 """What is remembered of a speed; the first three as logarithms [log N]."""

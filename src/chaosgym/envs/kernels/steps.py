@@ -7,7 +7,7 @@ are asked for, and ``which`` (k,) the jobs of the step.
 import numpy as np
 
 from chaosgym.core.kernel import njit
-from chaosgym.design.rating_life import LIFE_EXPONENT
+from chaosgym.rating_life import LIFE_EXPONENT
 
 RUNNING, JOB_DONE, FRACTURE, SIMULATION_FAILED, STALLED = range(5)
 

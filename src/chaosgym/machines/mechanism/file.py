@@ -34,9 +34,9 @@ from chaosgym.machines.mechanism.machine_class import machine_of
 from chaosgym.machines.mechanism.mechanism import Mechanism
 from chaosgym.machines.mechanism.nominal import places, revolution_of
 from chaosgym.machines.mechanism.spatial import SpatialMechanism
-from chaosgym.machines.numbers import number
 from chaosgym.machines.parameters import parameter
 from chaosgym.machines.stated import range_of, reduced, tolerances_of
+from chaosgym.numbers import number
 
 STILL = 1e-6
 """Stroke of a piston, as a share of the mechanism's length, below which it stands still."""

@@ -13,7 +13,7 @@ from chaosgym.machines.mechanism.joints import GROUND, KINDS, SPATIAL_KINDS, Joi
 from chaosgym.machines.mechanism.links import Body, Link
 from chaosgym.machines.mechanism.space import SpatialBody, spatial_link
 from chaosgym.machines.mechanism.spatial_beam import spatial_beam_link
-from chaosgym.machines.numbers import number
+from chaosgym.numbers import number
 
 T = TypeVar("T")
 

@@ -29,8 +29,8 @@ from chaosgym.machines.mechanism.motor import MOTOR_FIELDS, Load, Motor, MotorRu
 from chaosgym.machines.mechanism.nominal import Revolution, even_angles, places, revolution_of
 from chaosgym.machines.mechanism.notes import instabilities_of, notes_of
 from chaosgym.machines.mechanism.spatial_beam import fibre_stress_around
-from chaosgym.machines.numbers import number, whole
 from chaosgym.machines.parameters import assumed, parameter
+from chaosgym.numbers import number, whole
 
 if TYPE_CHECKING:
     from chaosgym.core.motor import Crank

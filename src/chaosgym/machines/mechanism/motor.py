@@ -16,7 +16,7 @@ import numpy as np
 
 from chaosgym.arrays import Array
 from chaosgym.errors import ParameterError
-from chaosgym.machines.numbers import number, whole
+from chaosgym.numbers import number, whole
 
 if TYPE_CHECKING:
     from chaosgym.core.motor import Crank

@@ -10,8 +10,8 @@ from typing import Any
 from chaosgym.errors import ParameterError
 from chaosgym.files import contents, first_line
 from chaosgym.machines.modal_machine.drive import KINDS
-from chaosgym.machines.numbers import shown
 from chaosgym.machines.parameters import suggestion
+from chaosgym.numbers import shown
 
 LARGEST = 10_000_000
 """Bytes that such a file may have."""

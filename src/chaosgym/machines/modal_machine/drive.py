@@ -10,7 +10,7 @@ from numpy.typing import ArrayLike
 from chaosgym.arrays import Array
 from chaosgym.errors import ParameterError
 from chaosgym.machines.modal_machine.structure import BASE, Structure
-from chaosgym.machines.numbers import numbers, shown
+from chaosgym.numbers import numbers, shown
 
 KINDS = {"force": "N", "unbalance": "kg m", "displacement": "m", "acceleration": "m/s^2"}
 """What a drive prescribes, and its unit: a force; mass times eccentricity, whose force grows with the square of the

@@ -23,7 +23,7 @@ from chaosgym.machines.modal_machine.turning import turning_joints
 from chaosgym.machines.modal_machine.varying import Spring, VaryingMachine, checked_samples
 from chaosgym.machines.parameters import described_as, parameter, parameters_of
 from chaosgym.machines.stated import class_with, range_of, reduced, tolerances_of
-from chaosgym.machines.units import TURNING
+from chaosgym.units import TURNING
 
 SAMPLED = ("drive", "joint", "spring")
 """Tables that take samples of a cycle."""

@@ -6,7 +6,7 @@ from typing import Any
 from chaosgym.machines.file_keys import OPERATION, TEXT, Key, Keys
 from chaosgym.machines.modal_machine.drive import KINDS
 from chaosgym.machines.modal_machine.limits import hint, told_of
-from chaosgym.machines.units import TURNING, turns
+from chaosgym.units import TURNING, turns
 
 SHAPE = Key(
     "mass-normalised mode shape there, a number for each mode; 'base': participation [kg^1/2]",

@@ -20,7 +20,7 @@ from chaosgym.machines.modal_machine.machine import OF_JOINT, ModalMachine, clea
 from chaosgym.machines.modal_machine.structure import Structure
 from chaosgym.machines.parameters import described_as, parameters_of
 from chaosgym.machines.stated import class_with, refuse_names
-from chaosgym.machines.units import TURNING
+from chaosgym.units import TURNING
 
 
 class Joint(NamedTuple):

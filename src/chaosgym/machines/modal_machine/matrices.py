@@ -9,7 +9,7 @@ import numpy as np
 from chaosgym.arrays import Array
 from chaosgym.errors import ParameterError
 from chaosgym.files import first_line
-from chaosgym.machines.numbers import numbers
+from chaosgym.numbers import numbers
 
 RIGID = 1e-12
 """Energy of a motion of the rigid body, against the sum of its terms without their signs: what rounding leaves."""

@@ -19,8 +19,8 @@ from numpy.typing import ArrayLike
 from chaosgym.arrays import Array
 from chaosgym.errors import ParameterError
 from chaosgym.machines.modal_machine.matrices import slowest_modes, symmetric, with_deflections
-from chaosgym.machines.numbers import number, numbers, shown
 from chaosgym.machines.parameters import suggestion
+from chaosgym.numbers import number, numbers, shown
 
 BASE = "base"
 """Point whose shape is the participation of each mode in a motion of the base [kg^1/2]."""

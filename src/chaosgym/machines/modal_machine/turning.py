@@ -6,8 +6,8 @@ from typing import Any
 from chaosgym.errors import ParameterError
 from chaosgym.machines.modal_machine.keys import SHAPE, TABLES
 from chaosgym.machines.modal_machine.structure import BASE
-from chaosgym.machines.numbers import shown
-from chaosgym.machines.units import TURNING, turns
+from chaosgym.numbers import shown
+from chaosgym.units import TURNING, turns
 
 MOTION = {True: "turns", False: "slides"}
 

@@ -30,8 +30,8 @@ from chaosgym.machines.modal_impact import Modes, with_rigid_bodies
 from chaosgym.machines.modal_machine.drive import Drive, checked, drive_notes, modal_drive
 from chaosgym.machines.modal_machine.machine import ModalMachine, as_there, rigid_note, turning_note
 from chaosgym.machines.modal_machine.structure import Structure
-from chaosgym.machines.numbers import numbers
 from chaosgym.machines.parameters import assumed
+from chaosgym.numbers import numbers
 
 FEWEST, MOST = 3, 3600
 """Samples of a stiffness over the cycle."""

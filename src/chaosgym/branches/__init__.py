@@ -1,0 +1,1 @@
+"""Branches of periodic orbits of a machine: bifurcations, margins, routes to chaos."""

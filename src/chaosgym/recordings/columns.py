@@ -1,0 +1,316 @@
+"""The force and the time among the columns of a recording, never a counter by mistake.
+
+Instants follow from a rate, or from time stamps whose rounding is forgiven and whose gaps are told.
+"""
+
+import math
+import re
+from fnmatch import fnmatchcase
+from typing import NamedTuple
+
+import numpy as np
+
+from chaosgym.arrays import Array
+from chaosgym.errors import DiagnosisError
+from chaosgym.recordings.read import Recording
+from chaosgym.units import ALTERNATIVES
+
+OTHER = re.compile(
+    r"(time|zeit|temps|stamp|date|datum|clock|cycle|zyklus|takt|index|nr|no|count(er)?|rpm|speed|drehzahl|hz|freq\w*|"
+    r"phase|angle|winkel|trigger|tacho\w*|temp\w*|displacement|velocity|position|weg)",
+    re.IGNORECASE,
+)
+"""Words in the name of a column that is no force."""
+
+SPEED = re.compile(r"hz|freq\w*|frequenz|rpm|speed|drehzahl", re.IGNORECASE)
+"""Words in the name of a column that holds the speed of each reading."""
+
+SPEEDS = ("Hz", "rpm", "1/min", "min-1", "rad/s")
+
+TIMES = {"s": 1.0, "ms": 1e-3, "us": 1e-6, "µs": 1e-6, "μs": 1e-6, "min": 60.0, "h": 3600.0}
+FORCES = {**ALTERNATIVES["N"], "daN": 10.0, "MN": 1e6, "kgf": 9.80665}
+_OTHERS = "g m/s² m/s2 m/s^2 m/s mm/s in/s m mm um µm μm in mil Pa kPa MPa bar psi V mV µV uV A mA Nm N·m FS"
+OTHERS = frozenset(_OTHERS.split())
+"""Units of force, and those of quantities that are judged in their own unit."""
+
+MOST_SHOWN = 12
+"""Columns that a message names."""
+
+VOLTS = {"V": 1.0, "mV": 1e-3, "µV": 1e-6, "uV": 1e-6}
+
+
+CALIBRATION = re.compile(r"\s*([\d.,]+(?:e[+-]?\d+)?)\s*([^\s/]+(?:/s(?:²|2|\^2))?)\s*(?:/\s*(\S+))?\s*", re.IGNORECASE)
+"""A number, a unit and the unit that it is divided by."""
+
+
+class Signal(NamedTuple):
+    """Readings of one column; ``described`` is one line on where they come from.
+
+    Forces are in newton, times in seconds, any other quantity in the ``unit`` of the file.
+    """
+
+    values: Array
+    name: str
+    described: str
+    unit: str = "N"
+
+
+def is_counter(values: Array) -> bool:
+    """Whether values rise in equal steps, as a counter or an even time stamp does."""
+    steps = np.diff(values)
+    return len(values) > 4 and bool(steps[0] > 0.0 and np.allclose(steps, steps[0], rtol=1e-6, atol=0.0))
+
+
+def is_clock(values: Array) -> bool:
+    """Whether values never fall and rise on and on, as rounded time stamps do."""
+    steps = np.diff(values)
+    steady = len(values) > 7 and bool(np.all(steps >= 0.0) and steps.mean() > 0.0)
+    return is_counter(values) or (steady and float(np.max(steps)) < 20.0 * float(steps.mean()))
+
+
+def _counts(values: Array) -> bool:
+    """Whether values are whole numbers in steps of one."""
+    return is_counter(values) and bool(values[1] - values[0] == 1.0 and values[0] == round(float(values[0])))
+
+
+def force_names(recording: Recording) -> list[str]:
+    """Columns that could be forces: those with a unit of force, or those that nothing speaks against; else others."""
+    known = [name for name, unit in recording.units.items() if unit in FORCES]
+    usable = [name for name in recording.columns if name not in recording.problems or recording.problems[name]]
+    named = [name for name in known if name in usable]
+    plain = [name for name in usable if not _speaks_against(recording, name)]
+    return named or plain or [name for name in usable if recording.units.get(name, "") in OTHERS]
+
+
+def _speaks_against(recording: Recording, name: str) -> str:
+    """Why a column is no force; empty if it may be one."""
+    values, unit = recording.columns[name], recording.units.get(name, "")
+    finite = values[np.isfinite(values)]
+    if unit and unit not in FORCES:
+        return f"is in {unit}"
+    if recording.named and any(OTHER.fullmatch(word) for word in re.split(r"[\W_\d]+", name) if word):
+        return "is no force by its name"
+    return (
+        "rises like a counter or a clock"
+        if is_counter(finite) or (len(recording.columns) > 1 and is_clock(finite))
+        else ""
+    )
+
+
+def choose_force(
+    recording: Recording, column: str | None = None, unit: str | None = None, scale: str | None = None
+) -> Signal:
+    """Force [N] of a recording, or another quantity in its own unit.
+
+    Parameters
+    ----------
+    recording
+        What was read.
+    column
+        Name of the column; needed where several could be the force.
+    unit
+        Its unit, if the file does not say it.
+    scale
+        Calibration, such as ``"100 mV/N"`` or ``"20 N/V"``, that makes a force or another quantity of the readings.
+
+    Raises
+    ------
+    DiagnosisError
+        If there is no such column, several could be meant, it can't be a force, or an entry is no finite number.
+
+    Examples
+    --------
+    >>> from chaosgym.recordings.columns import choose_force
+    >>> force = choose_force(chaosgym.read_recording("docs/data/peaks.csv"), "upper")
+    >>> force.name, force.unit, len(force.values)
+    ('upper', 'N', 1000)
+    """
+    if column is None:
+        names = force_names(recording)
+        if len(names) > 1:
+            raise DiagnosisError(
+                f"{recording.source} has several columns that could be forces: {_first(list(map(repr, names)), ', ')}; "
+                "use --column NAME"
+            )
+        if not names:
+            why = _first([f"{name!r} {_speaks_against(recording, name)}" for name in recording.columns], "; ")
+            raise DiagnosisError(f"{recording.source} has no column that could be a force ({why}); use --column NAME")
+        name = names[0]
+    else:
+        name = named_column(recording, column)
+    return _force(recording, name, unit, scale)
+
+
+def named_column(recording: Recording, column: str) -> str:
+    """Name of the column that is meant by a name or a number.
+
+    Raises
+    ------
+    DiagnosisError
+        If there is none.
+    """
+    matching = [name for name in recording.columns if name.casefold() == column.strip().casefold()]
+    place = re.fullmatch(r"\d{1,9}", column.strip(), re.ASCII)
+    if not matching and place and 1 <= int(column) <= len(recording.columns):
+        matching = [list(recording.columns)[int(column) - 1]]
+    if not matching:
+        listed = _first(list(map(repr, dict.fromkeys([*recording.columns, *recording.problems]))), ", ")
+        raise DiagnosisError(f"{recording.source} has no column {column!r}; its columns of numbers: {listed}")
+    return matching[0]
+
+
+def choose_speed(recording: Recording, column: str | None = None) -> Signal:
+    """Speed of each reading, in the file's unit: the column of that name, or the one whose name or unit says so.
+
+    Raises
+    ------
+    DiagnosisError
+        If there is no such column, several could be meant, or an entry is no finite number.
+    """
+    if column is None:
+        names = [
+            name
+            for name in dict.fromkeys([*recording.columns, *recording.problems])
+            if recording.units.get(name, "") in SPEEDS or any(map(SPEED.fullmatch, re.split(r"[\W_\d]+", name)))
+        ]
+        if len(names) != 1:
+            several = f"several columns that could be the speed: {_first(list(map(repr, names)), ', ')}"
+            told = several if names else "no column that says it is a speed"
+            raise DiagnosisError(f"{recording.source} has {told}; use --speed-column NAME")
+        name = names[0]
+    else:
+        name = named_column(recording, column)
+    if name in recording.problems:
+        raise DiagnosisError(f"{recording.source}, {recording.problems[name]}")
+    unit = recording.units.get(name, "")
+    return Signal(recording.columns[name], name, f"column {name!r}{f' ({unit})' if unit else ''} is the speed", unit)
+
+
+def forces(
+    recording: Recording, column: str | None = None, unit: str | None = None, scale: str | None = None
+) -> list[Signal]:
+    """Every column that could be a force [N], or those that are named: one run a column.
+
+    ``column`` is a name, a number, a pattern such as ``"bearing*"``, or several of them with commas between.
+    """
+    names = force_names(recording) if column is None else named_columns(recording, column)
+    if column is None and len(names) < 2:
+        return [choose_force(recording, None, unit, scale)]
+    return [_force(recording, name, unit, scale) for name in names]
+
+
+def named_columns(recording: Recording, column: str) -> list[str]:
+    """Columns that a name, a number, a pattern, or several of them with commas between mean; each once.
+
+    Raises
+    ------
+    DiagnosisError
+        If one of them means no column.
+    """
+    whole = [name for name in recording.columns if name.casefold() == column.strip().casefold()]
+    found = list(whole)
+    for part in [] if whole else column.split(","):
+        matching = [name for name in recording.columns if fnmatchcase(name.casefold(), part.strip().casefold())]
+        found += matching or [named_column(recording, part)]
+    return list(dict.fromkeys(found))
+
+
+def _force(recording: Recording, name: str, unit: str | None, scale: str | None) -> Signal:
+    if name in recording.problems:
+        raise DiagnosisError(f"{recording.source}, {recording.problems[name]}")
+    values, written = recording.columns[name], unit or recording.units.get(name, "")
+    if written and written not in FORCES and written not in OTHERS and not scale:
+        told = "allowed" if unit else "give its unit with --unit"
+        listed = ", ".join([*FORCES, *sorted(OTHERS)])
+        raise DiagnosisError(
+            f"{recording.source}: column {name!r} is in {written}, no unit that is known; {told}: {listed}"
+        )
+    if is_counter(values[np.isfinite(values)]):
+        raise DiagnosisError(f"{recording.source}: column {name!r} rises in equal steps and can't be a force")
+    factor, target = FORCES.get(written or "N", 1.0), "N" if (written or "N") in FORCES else written
+    shown = f"{written}" if written else "taken as N"
+    if scale:
+        factor, target = calibration(scale, written)
+        shown = f"{written or 'no unit'}, {scale.strip()}"
+    described = f"{recording.source}: {recording.form}, column {name!r} ({shown}), {len(values)} readings"
+    if missing := int(np.count_nonzero(~np.isfinite(values))):
+        described += f", {missing} of them missing, the first in {recording.where(int(np.argmin(np.isfinite(values))))}"
+    return Signal(values * factor, name, described, target)
+
+
+def calibration(scale: str, written: str) -> tuple[float, str]:
+    """(factor, unit) that make a quantity of readings in the unit ``written``.
+
+    ``100 mV/N`` is a sensitivity, ``20 N/V`` a range; the side that is not the readings' unit is the quantity's.
+
+    Raises
+    ------
+    DiagnosisError
+        If the text is no calibration, or neither side is a unit of the readings.
+    """
+    found = CALIBRATION.fullmatch(scale)
+    try:
+        size = float(found[1].replace(",", ".")) if found else 0.0
+    except ValueError:
+        size = 0.0
+    if found is None or not 0.0 < size < math.inf:
+        raise DiagnosisError(f"--scale {scale!r} is no calibration; allowed: such as '100 mV/N', '20 N/V' or '50 N/FS'")
+    above, below = found[2], found[3] or written or "FS"
+    for factor, quantity, electric in ((size, above, below), (1.0 / size, below, above)):
+        turned = _same_kind(written, electric)
+        if turned and (quantity in FORCES or quantity in OTHERS):
+            force = quantity in FORCES
+            return factor * turned * FORCES.get(quantity, 1.0), "N" if force else quantity
+    raise DiagnosisError(f"--scale {scale!r} does not fit readings in {written or 'no unit'}; state theirs with --unit")
+
+
+def _same_kind(written: str, electric: str) -> float:
+    """Readings' unit in that of the calibration; 0 if they are of different kinds."""
+    if written in VOLTS and electric in VOLTS:
+        return VOLTS[written] / VOLTS[electric]
+    return 1.0 if electric == written or (not written and electric == "FS") else 0.0
+
+
+def check_peaks(signal: Signal, recording: Recording) -> Array:
+    """Peaks of a column, without those that are missing.
+
+    Raises
+    ------
+    DiagnosisError
+        If a force is negative.
+    """
+    low = np.flatnonzero(signal.values < 0.0)
+    if len(low) and signal.unit == "N":
+        raise DiagnosisError(
+            f"{recording.source}, {recording.where(int(low[0]))}: {signal.values[low[0]]:g} N is a negative force; "
+            "allowed: 0 N and more, one peak a cycle"
+        )
+    return signal.values[np.isfinite(signal.values)]
+
+
+def choose_time(recording: Recording, *, told: bool = False) -> Signal | None:
+    """Time stamps [s], if a column holds them: by its unit, its name, or as the one that rises like a clock.
+
+    With ``told`` only those that unit or name tell. A column that counts one by one is no clock.
+    """
+    fits = [name for name in recording.columns if recording.units.get(name, "") in TIMES]
+    fits += [name for name in recording.columns if re.search(r"time|zeit|temps|stamp", name, re.IGNORECASE)]
+    if len(recording.columns) > 1 and not told:
+        fits += [
+            name
+            for name, values in recording.columns.items()
+            if is_clock(values) and not recording.units.get(name) and not _counts(values)
+        ]
+    if not fits:
+        return None
+    name = fits[0]
+    if name in recording.problems:
+        raise DiagnosisError(f"{recording.source}, {recording.problems[name]}")
+    unit = recording.units.get(name, "s")
+    return Signal(recording.columns[name] * TIMES.get(unit, 1.0), name, f"time from column {name!r} [{unit}]", "s")
+
+
+def _first(texts: list[str], between: str) -> str:
+    """The first of many, and how many follow."""
+    more = len(texts) - MOST_SHOWN
+    return between.join(texts[:MOST_SHOWN]) + (f" and {more} more" if more > 0 else "")

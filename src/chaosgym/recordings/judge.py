@@ -1,0 +1,228 @@
+r"""The nature of a measured record: one answer from peaks and the sensor's error, or "undetermined".
+
+1. Single wrong readings are replaced and missing cycles filled in; both are reported.
+2. A record of two regimes is cut, and each part judged; chaos in one part counts, as in the Two-Step Test.
+3. What repeats exactly is periodic. What scatters is compared with the stated error. Without one the scatter itself is
+   judged: a sensor's is random from cycle to cycle and small, chaos can be forecast from what came before.
+4. What is irregular beyond the error goes to step II of the Two-Step Test: chaotic, quasiperiodic or undetermined.
+"""
+
+import math
+import re
+from dataclasses import replace
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from chaosgym.arrays import Array
+from chaosgym.errors import DiagnosisError
+from chaosgym.recordings.measured_verdict import MeasuredVerdict
+from chaosgym.recordings.scatter import judge_scatter, newton, scatter_of
+from chaosgym.recordings.sensors import judge_together
+from chaosgym.series.noise import SensorError, find_change, quantum, repair, stated_error
+from chaosgym.series.two_step import INITIAL_TRANSIENT, two_step_test
+from chaosgym.series.verdict import Diagnosis, undetermined
+
+FEWEST_CYCLES, SHORT_RECORD = 8, 16
+"""Cycles below which a record is refused, and below which nothing is told of it."""
+
+LARGEST_FORCE, SMALLEST_FORCE = 1e9, 1e-100
+"""Force [N] beyond which a unit must be wrong, and below which its square is no number."""
+
+MOST_PARTS = 3
+"""How often a record is cut in two."""
+
+
+def judge_peaks(
+    peaks: ArrayLike,
+    *,
+    sensor_error: float | None = None,
+    sensor_sigma: float | None = None,
+    resolution: float = 0.0,
+    unit: str = "N",
+) -> MeasuredVerdict:
+    """Tell the nature of a measured response from one reading a cycle of one sensor, or of several.
+
+    Parameters
+    ----------
+    peaks : (cycles,) or (cycles, sensors)
+        Peak force [N] of each cycle, or any other reading once a cycle, in ``unit``.
+    sensor_error
+        Largest error of a reading (half width), if it is known.
+    sensor_sigma
+        Its standard deviation instead. Without either the error is estimated from the record.
+    resolution
+        Half width of what the evaluation itself adds, such as the sampling of a series.
+    unit
+        Unit of the readings, in which the verdict tells sizes.
+
+    Raises
+    ------
+    DiagnosisError
+        If there are fewer than 8 readings, one is not finite or beyond 1e9, all are below 1e-100, or the error is none.
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> noise = np.random.default_rng(0).normal(size=300)
+    >>> judge_peaks(np.tile([40.0, 60.0], 150) + 0.1 * noise, sensor_sigma=0.1).diagnosis.words
+    'periodic, period 2'
+    """
+    if np.ndim(peaks) == 2:
+        table = np.asarray(peaks, dtype=float)
+        if not table.shape[1]:
+            raise DiagnosisError(f"the record has shape {table.shape}; allowed: (cycles,) or (cycles, sensors)")
+        alone = [
+            judge_peaks(column, sensor_error=sensor_error, sensor_sigma=sensor_sigma, resolution=resolution, unit=unit)
+            for column in table.T
+        ]
+        return judge_together(alone, table, [f"sensor {place}" for place in range(1, len(alone) + 1)])
+    if unit != "N":
+        verdict = judge_peaks(peaks, sensor_error=sensor_error, sensor_sigma=sensor_sigma, resolution=resolution)
+        return _in_unit(verdict, unit)
+    readings = _checked(peaks)
+    told = stated_error(sensor_error, sensor_sigma)
+    if not np.any(readings):
+        return MeasuredVerdict(undetermined("all peaks are zero: there is no contact to judge", readings), told)
+    if len(readings) < SHORT_RECORD:
+        few = f"{len(readings)} cycles are too few to judge; needed: {SHORT_RECORD} or more"
+        return MeasuredVerdict(undetermined(few, readings), told)
+    whole, outliers, gaps = repair(readings)
+    why = unsteady(whole)
+    if why:
+        return MeasuredVerdict(undetermined(f"not a steady response: {why}", readings), told, outliers=outliers)
+    resolved = max(resolution, 0.5 * quantum(readings))
+    parts = _parts(whole, resolved / math.sqrt(3.0) + 1e-5 * float(np.max(np.abs(whole))), MOST_PARTS)
+    verdicts = [_judge_part(part, told, resolved) for part in parts]
+    verdict = _joined(verdicts, [len(part) for part in parts])
+    if len(parts) > 1 and verdict.diagnosis.nature == "undetermined":
+        verdict = _judge_part(whole, told, resolved)
+    changes = tuple(int(place) + 1 for place in np.cumsum([len(part) for part in parts])[:-1])
+    notes = [*verdict.notes]
+    if outliers:
+        notes.insert(0, f"left out as wrong readings: cycle{'s' * (len(outliers) > 1)} {_listed(outliers)}")
+    if gaps:
+        notes.insert(0, f"cycles are missing before cycle {_listed(gaps)}")
+    if len(changes) == 1:
+        notes.insert(0, f"the response changes at cycle {changes[0]}")
+    return replace(verdict, outliers=outliers, gaps=gaps, changes=changes, notes=tuple(notes))
+
+
+def _in_unit(verdict: MeasuredVerdict, unit: str) -> MeasuredVerdict:
+    """The verdict with its sizes in another unit than newton."""
+
+    def shown(text: str) -> str:
+        return re.sub(r"(?<=\d) N\b", f" {unit}", text.replace("the force", "the reading"))
+
+    diagnosis = replace(verdict.diagnosis, reason=shown(verdict.diagnosis.reason))
+    return replace(verdict, diagnosis=diagnosis, notes=tuple(map(shown, verdict.notes)), unit=unit)
+
+
+def _checked(peaks: ArrayLike) -> Array:
+    readings = np.asarray(peaks, dtype=float)
+    if readings.ndim != 1:
+        raise DiagnosisError(f"the record has shape {readings.shape}; allowed: (cycles,) or (cycles, sensors)")
+    if len(readings) < FEWEST_CYCLES:
+        raise DiagnosisError(f"the record has {len(readings)} cycles; allowed: {FEWEST_CYCLES} or more")
+    bad = np.flatnonzero(~(np.abs(readings) <= LARGEST_FORCE))
+    if len(bad):
+        raise DiagnosisError(
+            f"reading {readings[bad[0]]:g} in cycle {bad[0] + 1} is no force in newton; allowed: finite, up to "
+            f"{LARGEST_FORCE:g} N"
+        )
+    largest = float(np.max(np.abs(readings)))
+    if 0.0 < largest < SMALLEST_FORCE:
+        raise DiagnosisError(f"the largest reading is {largest:g} N; allowed: 0, or {SMALLEST_FORCE:g} N and more")
+    return readings
+
+
+def _listed(cycles: tuple[int, ...]) -> str:
+    shown = ", ".join(str(cycle) for cycle in cycles[:5])
+    return shown if len(cycles) <= 5 else f"{shown} and {len(cycles) - 5} more"
+
+
+def _parts(readings: Array, floor: float, cuts: int) -> list[Array]:
+    """Stretches of one regime each."""
+    place = find_change(readings, floor) if cuts else None
+    if place is None:
+        return [readings]
+    return [*_parts(readings[:place], floor, cuts - 1), *_parts(readings[place:], floor, cuts - 1)]
+
+
+def _joined(verdicts: list[MeasuredVerdict], cycles: list[int]) -> MeasuredVerdict:
+    """Verdict on the whole: the last regime, unless an earlier one was irregular for more than a transient."""
+    last = verdicts[-1]
+    if len(verdicts) == 1:
+        return last
+    natures = [verdict.diagnosis.nature for verdict in verdicts]
+    irregular = [verdict for verdict in verdicts if verdict.diagnosis.nature in ("chaotic", "quasiperiodic")]
+    horizon = sum(cycles)
+    if len(verdicts) > 2 and irregular:
+        reason = f"intermittent: {len(verdicts) - 1} changes between {' and '.join(dict.fromkeys(natures))} stretches"
+        return replace(irregular[0], diagnosis=replace(irregular[0].diagnosis, reason=reason, horizon=horizon))
+    before = [v for v, n in zip(verdicts[:-1], cycles[:-1], strict=True) if n > INITIAL_TRANSIENT]
+    if last.diagnosis.nature == "periodic" and not before:
+        settled = replace(last.diagnosis, settle_cycle=horizon - cycles[-1], horizon=horizon)
+        return replace(last, diagnosis=settled)
+    told = "; ".join(
+        f"cycles {end - n + 1} to {end}: {v.diagnosis.nature}, {v.diagnosis.reason}"
+        for v, n, end in zip(verdicts, cycles, np.cumsum(cycles), strict=True)
+    )
+    decisive = next((v for v in irregular if v in [*before, last]), last)
+    if not irregular and "undetermined" in natures:
+        decisive = verdicts[natures.index("undetermined")]
+    return replace(decisive, diagnosis=replace(decisive.diagnosis, reason=told, horizon=horizon))
+
+
+def _judge_part(readings: Array, told: SensorError | None, resolved: float) -> MeasuredVerdict:
+    """Verdict on a stretch of one regime."""
+    size = len(readings)
+    if size < SHORT_RECORD:
+        return MeasuredVerdict(undetermined(f"{size} cycles are too few to judge", readings), told)
+    found, exact = None, two_step_test(readings)
+    if exact.nature in ("chaotic", "undetermined"):
+        found = scatter_of(readings, resolved / math.sqrt(3.0))
+        exact = two_step_test(found.readings) if found.drift else exact
+    notes = (f"drifts by {found.drift:.3g} N over the record",) if found is not None and found.drift else ()
+    if found is None or exact.nature in ("periodic", "quasiperiodic"):
+        told = told or SensorError(resolved, resolved / math.sqrt(3.0), "estimated")
+        return MeasuredVerdict(_in_newton(exact, readings, resolved), told, notes=notes)
+    return replace(judge_scatter(found, told, resolved), notes=notes)
+
+
+BLOCKS, STEP, STEADY = 8, 0.03, 2.0
+"""Blocks of a record whose levels and swings are compared, the share by which each must rise or fall where the response
+grows or decays, and the factor that makes in all."""
+
+EVENT_SHARE, EVENT_VARIANCE = 0.1, 0.9
+"""Share of the cycles in which a single event lasts, and of the variance that it holds."""
+
+
+def unsteady(readings: Array) -> str:
+    """In what way a response is not steady: it decays, grows, or is a single event; empty if it is none of these."""
+    size = len(readings)
+    if size < 4 * BLOCKS or np.ptp(readings) == 0.0:
+        return ""
+    blocks = readings[: size // BLOCKS * BLOCKS].reshape(BLOCKS, -1)
+    levels, swings = np.mean(np.abs(blocks), axis=1), np.std(np.diff(blocks, axis=1), axis=1)
+    for name, values, ways in (("the force", levels, (1.0, -1.0)), ("its variation", swings, (1.0,))):
+        for way in ways:
+            ordered = values[:: int(way)]
+            factor = float(ordered[-1] / max(ordered[0], 1e-300))
+            if np.all(ordered[1:] > (1.0 + STEP) * ordered[:-1]) and factor > STEADY:
+                return f"{name} {'grows' if way > 0.0 else 'decays'} {min(factor, 1e6):.2g} times over the record"
+    away = (readings - np.median(readings)) ** 2
+    span = max(1, round(EVENT_SHARE * size))
+    held = float(np.convolve(away, np.ones(span), "valid").max()) / float(away.sum())
+    event = f"{100.0 * held:.0f} % of its variation lies within {span} cycles, a single event"
+    return event if held > EVENT_VARIANCE else ""
+
+
+def _in_newton(exact: Diagnosis, readings: Array, resolved: float) -> Diagnosis:
+    """The verdict of the Two-Step Test with its residual as a force."""
+    residual = exact.evidence.get("residual")
+    if exact.nature != "periodic" or not isinstance(residual, float) or exact.reason.startswith("approaches"):
+        return exact
+    within = max(residual * float(np.max(np.abs(readings))), resolved)
+    cycle = "cycle" if exact.period == 1 else f"{exact.period} cycles"
+    return replace(exact, reason=f"repeats every {cycle} within {newton(within)}")

@@ -1,0 +1,302 @@
+"""A monitor of peak forces, one a cycle: an alarm when they vary by more than the sensor's error.
+
+The rule is a cumulative sum (E. S. Page, Biometrika 41, 1954) for every lag k of 1 to 8 cycles, or more:
+
+    g_k <- max(0, g_k + min(|x(n) - x(n - k)| / 2e, CAP) - DRIFT)        e: largest error of a peak
+
+Two readings of a repeating response differ by 2e at the most, and by a third of that on average, so that the sum of its
+period stays near zero; of an irregular response all sums grow. The alarm goes on where the least of them exceeds LIMIT,
+and off where it has sunk below a third of that. The first 64 cycles tell the error where none is stated, or
+where the sensor is up to twice as bad as stated.
+"""
+
+import math
+from collections import deque
+from collections.abc import Callable, Iterator
+from contextlib import AbstractContextManager
+from dataclasses import asdict, dataclass
+from pathlib import Path
+from typing import Any, Literal, TextIO
+
+import numpy as np
+
+from chaosgym.arrays import Array, Indices
+from chaosgym.errors import ChaosgymError, DiagnosisError
+from chaosgym.series.stroboscopic import irregularity
+
+Event = Literal["", "change", "alarm", "all clear", "dead sensor", "missing"]
+
+LAGS, LONGEST = 8, 16
+"""Longest period that counts as repeating, and that of ``chaosgym classify --follow``."""
+
+DRIFT, CAP, LIMIT = 0.45, 1.5, 2.5
+"""Of the cumulative sums, in twice the sensor's error."""
+
+CLEAR = LIMIT / 3.0
+"""Level below which an alarm ends."""
+
+HIGHEST = LIMIT + 2.0
+"""Level beyond which the sums don't grow, so that an alarm can end soon."""
+
+NO_REPEAT = 1.1
+"""Difference that no error explains: if it is seen at every lag at once, the regime has changed."""
+
+LEARNED, TRIED, WORSE = 64, 48, (1.3, 2.0)
+"""First cycles by which the error is learned, those by which a stated one is tried, and how many times worse than
+stated a sensor is taken as it is."""
+
+EVEN, SLACK, SAME = 1.5, 1.1, 1.5
+"""Half width of an even error in mean differences of two readings, what is added to one that is learned, and the factor
+within which differences at two lags are the same."""
+
+DEAD = 32
+"""Equal readings in succession that tell of a dead sensor, where readings differed before."""
+
+FIRST = np.zeros(1, np.int64)
+"""Number of the one sensor of a monitor."""
+
+WINDOW, LEAST = 64, 3
+"""Cycles since the last change, at most and at least, from which the amplitude is taken."""
+
+
+class RepeatSums:
+    """The cumulative sums of N sensors side by side.
+
+    Attributes
+    ----------
+    cycles : (N,)
+        Peaks seen of each.
+    """
+
+    def __init__(self, count: int, lags: int = LAGS) -> None:
+        self.cycles = np.zeros(count, np.int64)
+        self._sums = np.zeros((count, lags))
+        self._last = np.full((count, lags), np.nan)
+
+    def forget(self, which: Indices) -> None:
+        """Reset the sensors ``which`` (k,)."""
+        self.cycles[which], self._sums[which], self._last[which] = 0, 0.0, np.nan
+
+    def add(self, which: Indices, peaks: Array, sensor_error: float) -> Array:
+        """Add a peak (k,) [N] of each, NaN if it is missing; return its differences (k, lags) in twice the error."""
+        last = self._last[which]
+        gaps: Array = np.abs(peaks[:, None] - last) / (2.0 * sensor_error)
+        added = np.where(np.isnan(gaps), 0.0, np.minimum(gaps, CAP) - DRIFT)
+        self._sums[which] = np.minimum(np.maximum(self._sums[which] + added, 0.0), HIGHEST)
+        self._last[which] = np.concatenate([peaks[:, None], last[:, :-1]], axis=1)
+        self.cycles[which] += 1
+        return gaps
+
+    def level(self, which: Indices) -> Array:
+        """Least sum over its limit, (k,); 0 until every lag has been measured twice."""
+        known = self.cycles[which] > 2 * self._sums.shape[1]
+        return np.asarray(np.where(known, self._sums[which].min(axis=1) / LIMIT, 0.0))
+
+
+@dataclass(frozen=True)
+class Watch:
+    """State of the monitor after a cycle.
+
+    Attributes
+    ----------
+    cycle, peak
+        Number of the cycle, from 1, and its peak force [N].
+    alarm
+        Whether the response is irregular beyond the sensor's error; None during the first 16 cycles, or 64 where no
+        error is stated.
+    level
+        Least cumulative sum over its limit: the alarm goes on above 1.
+    amplitude
+        By how much the peaks since the last change do not repeat [N], the sensor's error included; None at first.
+    event
+        "change" of the regime, "alarm" or "all clear" in this cycle, "dead sensor" where readings no longer
+        differ, "missing" for a cycle without a reading; empty otherwise.
+    """
+
+    cycle: int
+    peak: float
+    alarm: bool | None
+    level: float
+    amplitude: float | None
+    event: Event
+
+    def as_dict(self) -> dict[str, Any]:
+        """Return plain values for JSON."""
+        return asdict(self) | {"peak": None if math.isnan(self.peak) else self.peak}
+
+    def __str__(self) -> str:
+        state = {None: "waiting", False: "regular", True: "IRREGULAR"}[self.alarm]
+        size = "" if self.amplitude is None else f"  amplitude {self.amplitude:8.2f} N"
+        event = f"  <- {self.event}" if self.event else ""
+        return f"{self.cycle:6d}  {self.peak:9.2f} N  {state:9s}  level {self.level:4.2f}{size}{event}"
+
+
+class Monitor:
+    """Watches peak forces as they come.
+
+        monitor = Monitor(sensor_error=3.0)
+        for peak in sensor:
+            if monitor.update(peak).event == "alarm":
+                slow_down()
+
+    Parameters
+    ----------
+    sensor_error
+        Largest error of a peak [N], above 0. Without it the first 64 cycles, which are taken for regular, tell it. A
+        sensor that scatters up to twice as much in them is taken as it is.
+    longest_period
+        Longest period [cycles] that counts as repeating; the first verdict comes after twice as many cycles.
+    on_event
+        Called with the ``Watch`` of every cycle that has an event.
+
+    Raises
+    ------
+    DiagnosisError
+        If the error is not a number above 0, or the period not one of 1 to 64.
+
+    Examples
+    --------
+    >>> monitor = chaosgym.Monitor(sensor_error=3.0)
+    >>> peaks = [30.0, 31.0] * 20 + [30.0, 52.0, 11.0, 44.0, 25.0, 58.0, 17.0, 39.0]
+    >>> [watch.cycle for watch in map(monitor.update, peaks) if watch.event == "alarm"]
+    [44]
+    """
+
+    def __init__(
+        self,
+        sensor_error: float | None = None,
+        *,
+        longest_period: int = LAGS,
+        on_event: Callable[[Watch], None] | None = None,
+    ) -> None:
+        if sensor_error is not None and not (math.isfinite(sensor_error) and sensor_error > 0.0):
+            raise DiagnosisError(f"sensor_error = {sensor_error:g} N is out of range; allowed: above 0")
+        if not 1 <= longest_period <= 64:
+            raise DiagnosisError(f"longest_period = {longest_period} is out of range; allowed: 1 to 64")
+        self.longest_period = longest_period
+        self.stated = None if sensor_error is None else float(sensor_error)
+        self.on_event = on_event
+        self.reset()
+
+    def reset(self) -> None:
+        """Start anew, without earlier readings."""
+        self.cycle, self.alarm, self.missing, self.dead = 0, False, 0, False
+        self.sensor_error = self.stated
+        self._sums = RepeatSums(1, self.longest_period)
+        self._since: deque[float] = deque(maxlen=WINDOW)
+        self._first: list[float] = []
+        self._equal, self._differed = 1, False
+
+    @property
+    def state(self) -> dict[str, Any]:
+        """State as plain values for JSON."""
+        names = ("cycle", "alarm", "sensor_error", "stated", "missing", "dead")
+        return {**{name: getattr(self, name) for name in names}, "level": float(self._sums.level(FIRST)[0])}
+
+    def update(self, peak: float) -> Watch:
+        """Take the peak force [N] of one more cycle.
+
+        Raises
+        ------
+        DiagnosisError
+            If it is negative or not finite; the cycle is not counted.
+        """
+        if not (math.isfinite(peak) and peak >= 0.0):
+            raise DiagnosisError(f"cycle {self.cycle + 1}: peak = {peak:g} N; allowed: finite forces of 0 N and more")
+        died = self._note_equal(float(peak))
+        self._learn(float(peak))
+        gaps = self._sums.add(FIRST, np.array([float(peak)]), self.sensor_error or math.inf)
+        # a gap to a peak that is not known yet is NaN, and larger than nothing
+        changed = bool((gaps > NO_REPEAT).all()) and not self.alarm
+        if changed:
+            self._since.clear()
+        self._since.append(peak)
+        self.cycle += 1
+        ready = self.cycle > 2 * self.longest_period and self.sensor_error is not None
+        level = float(self._sums.level(FIRST)[0])
+        before, self.alarm = self.alarm, level > (CLEAR / LIMIT if self.alarm else 1.0)
+        event: Event = "change" if changed and ready else "dead sensor" if died else ""
+        if self.alarm != before:
+            event = "alarm" if self.alarm else "all clear"
+        amplitude = irregularity(np.array(self._since), 2 * LAGS) if len(self._since) >= LEAST else None
+        return self._told(Watch(self.cycle, float(peak), self.alarm if ready else None, level, amplitude, event))
+
+    def skip(self) -> Watch:
+        """Count a cycle whose reading is missing or is no force; later readings keep their place in the period."""
+        self._sums.add(FIRST, np.array([math.nan]), self.sensor_error or math.inf)
+        self.cycle, self.missing = self.cycle + 1, self.missing + 1
+        level = float(self._sums.level(FIRST)[0])
+        return self._told(Watch(self.cycle, math.nan, self.alarm, level, None, "missing"))
+
+    def _told(self, seen: Watch) -> Watch:
+        if seen.event and self.on_event is not None:
+            self.on_event(seen)
+        return seen
+
+    def _note_equal(self, peak: float) -> bool:
+        """Whether this reading is the one by which a sensor counts as dead."""
+        last = self._since[-1] if self._since else None
+        self._equal = self._equal + 1 if peak == last else 1
+        self._differed |= last is not None and peak != last
+        before, self.dead = self.dead, self._equal >= DEAD and (self._differed or peak == 0.0)
+        return self.dead and not before
+
+    def _learn(self, peak: float) -> None:
+        """Take the error from the first cycles where it is not stated, or the sensor is worse than stated."""
+        wanted = LEARNED if self.stated is None else TRIED
+        if len(self._first) >= wanted:
+            return
+        self._first.append(peak)
+        if len(self._first) < wanted:
+            return
+        seen = np.array(self._first)
+        longest = min(self.longest_period, wanted // 2)
+        means = np.array([float(np.mean(np.abs(seen[k:] - seen[:-k]))) for k in range(1, longest + 1)])
+        period = int(np.flatnonzero(means <= SAME * means.min())[0]) + 1
+        learned = SLACK * EVEN * float(means[period - 1 :: period].mean())
+        if self.stated is None:
+            self.sensor_error = max(learned, 1e-6 * float(np.max(seen)), 1e-300)
+        elif WORSE[0] * self.stated < learned <= WORSE[1] * self.stated and not self.alarm:
+            self.sensor_error = learned
+
+    def watch(self, peaks: Any) -> Iterator[Watch]:
+        """Update with every peak of a series, one after the other."""
+        for peak in peaks:
+            yield self.update(float(peak))
+
+
+class EventLog(AbstractContextManager["EventLog"]):
+    """A CSV file to which events are appended as they happen: cycle, event, peak [N], amplitude [N].
+
+    Without a path it keeps nothing.
+
+    Raises
+    ------
+    ChaosgymError
+        If the file can't be written.
+    """
+
+    def __init__(self, path: str | Path | None) -> None:
+        self._file: TextIO | None = None
+        if path is not None:
+            try:
+                self._file = open(path, "a", encoding="utf-8")  # noqa: SIM115
+            except OSError as error:
+                raise ChaosgymError(f"{path} can't be written: {error}; choose another file") from error
+            if self._file.tell() == 0:
+                self._write("cycle,event,peak_N,amplitude_N")
+
+    def note(self, seen: Watch) -> None:
+        """Append the event of a cycle, if it has one."""
+        if seen.event:
+            size = "" if seen.amplitude is None else f"{seen.amplitude:.6g}"
+            self._write(f"{seen.cycle},{seen.event},{seen.peak:.6g},{size}")
+
+    def _write(self, line: str) -> None:
+        if self._file is not None:
+            self._file.write(line + "\n")
+            self._file.flush()
+
+    def __exit__(self, *_: object) -> None:
+        if self._file is not None:
+            self._file.close()

@@ -1,1 +1,0 @@
-"""Measured signals: one reader for every file, cycles of a series, and the error of a sensor."""

@@ -1,0 +1,168 @@
+"""The monitor: quiet while peaks repeat, an alarm soon after they do not, and quiet again."""
+
+import numpy as np
+import pytest
+
+from chaosgym.errors import ChaosgymError, DiagnosisError
+from chaosgym.recordings.monitor import DEAD, LAGS, LONGEST, EventLog, Monitor, RepeatSums
+from tests.classifier.made_up import settled
+
+ERROR = 1.0
+
+
+def noisy(record, seed):
+    """A record as a sensor of +-1 N reads it."""
+    return record + np.random.default_rng(seed).uniform(-ERROR, ERROR, len(record))
+
+
+def events(peaks):
+    """(cycle, event) of everything that happens."""
+    return [(seen.cycle, seen.event) for seen in Monitor(ERROR).watch(peaks) if seen.event]
+
+
+@pytest.mark.parametrize("rate", [2.6, 3.2, 3.5, 3.55])
+def test_repeating_peaks_raise_no_alarm(rate):
+    """Periods of 1, 2, 4 and 8 cycles through noise, 5,000 cycles each."""
+    assert events(noisy(settled(rate, 5000), 1)) == []
+
+
+def test_chaos_is_seen_within_a_few_cycles():
+    """From a period of 2 into chaos: an alarm within 8 cycles in nine runs of ten."""
+    delays = []
+    for seed in range(40):
+        peaks = np.concatenate([settled(3.2, 60), settled(3.9, 60 + seed)[seed:]])
+        alarms = [cycle for cycle, event in events(noisy(peaks, seed)) if event == "alarm"]
+        delays.append(alarms[0] - 60 if alarms else 99)
+    assert min(delays) >= 1
+    assert np.percentile(delays, 90) <= 8
+
+
+def test_a_jump_between_two_regular_regimes_is_a_change_and_no_alarm():
+    """A level that moves by 20 N is noted in the cycle of the jump."""
+    found = events(noisy(np.concatenate([np.full(60, 40.0), np.full(60, 60.0)]), 3))
+    assert found == [(61, "change")]
+
+
+def test_the_alarm_ends_when_the_peaks_repeat_again():
+    """Back from chaos it is all clear within two dozen cycles, once, without flicker."""
+    peaks = noisy(np.concatenate([settled(3.2, 60), settled(3.9, 60), settled(3.2, 120)]), 4)
+    kinds = [event for _, event in events(peaks) if event != "change"]
+    assert kinds == ["alarm", "all clear"]
+    clear = next(cycle for cycle, event in events(peaks) if event == "all clear")
+    assert 120 < clear <= 120 + 24 + LAGS
+
+
+def test_scatter_within_the_sensor_error_is_regular():
+    """Chaos of +-0.8 N is noise to a sensor of 3 N, and an alarm to one of 0.1 N."""
+    weak = 40.0 + 0.04 * (settled(3.9, 400) - 40.0)
+    assert not any(seen.alarm for seen in Monitor(3.0).watch(weak))
+    assert sum(bool(seen.alarm) for seen in Monitor(0.1).watch(weak)) > 350
+
+
+def test_the_first_cycles_wait():
+    """Until every period could repeat there is no verdict."""
+    seen = list(Monitor(ERROR).watch(settled(3.9, 40)))
+    assert [one.alarm for one in seen[: 2 * LAGS]] == [None] * 2 * LAGS
+    assert seen[-1].alarm
+    assert "waiting" in str(seen[0])
+    assert "IRREGULAR" in str(seen[-1])
+
+
+def test_amplitude_counts_from_the_last_change():
+    """After a jump between levels the amplitude is that of the new regime, not of the jump."""
+    peaks = np.concatenate([np.full(60, 40.0), np.full(60, 60.0)])
+    assert list(Monitor(ERROR).watch(noisy(peaks, 5)))[-1].amplitude < 1.2
+
+
+def pink(rng, cycles):
+    """1/f noise with a standard deviation of 1."""
+    frequency = np.fft.rfftfreq(cycles)
+    spectrum = rng.normal(size=len(frequency)) + 1j * rng.normal(size=len(frequency))
+    spectrum[1:] /= np.sqrt(frequency[1:])
+    spectrum[0] = 0.0
+    made = np.fft.irfft(spectrum, cycles)
+    return made / made.std()
+
+
+@pytest.mark.parametrize("kind", ["pink, learned", "normal, learned", "sensor 1.5 times worse", "periods 9, 12 and 16"])
+def test_harmless_scatter_raises_no_alarm_in_thousands_of_cycles(kind):
+    """Pink noise of 1 % with a learned error, a sensor that is worse than told, and long periods: no alarm."""
+    rng = np.random.default_rng(7)
+    runs = {
+        "pink, learned": lambda: [(None, 50.0 + 0.5 * pink(rng, 5000))],
+        "normal, learned": lambda: [(None, 50.0 + 0.5 * rng.normal(size=5000))],
+        "sensor 1.5 times worse": lambda: [(1.0, 50.0 + 1.5 * rng.uniform(-1.0, 1.0, 5000))],
+        "periods 9, 12 and 16": lambda: [
+            (1.0, np.resize(50.0 + 20.0 * rng.random(k), 1700) + rng.uniform(-1.0, 1.0, 1700)) for k in (9, 12, 16)
+        ],
+    }[kind]()
+    seen = [[one.event for one in Monitor(error, longest_period=LONGEST).watch(peaks)] for error, peaks in runs]
+    assert sum(events.count("alarm") for events in seen) == 0
+
+
+def test_a_learned_error_still_finds_chaos():
+    """After 64 regular cycles chaos raises the alarm within 16 cycles, and the state tells the learned error."""
+    monitor = Monitor()
+    list(monitor.watch(noisy(settled(3.2, 100), 1)))
+    assert monitor.state["sensor_error"] == pytest.approx(1.1 * ERROR, rel=0.3)
+    alarms = [seen.cycle for seen in monitor.watch(noisy(settled(3.9, 60), 2)) if seen.event == "alarm"]
+    assert alarms[0] <= 116
+
+
+def test_a_dead_sensor_and_missing_cycles_are_events():
+    """Equal readings after others, and zeros; a missing cycle keeps the phase, so that period 3 goes on."""
+    told = []
+    monitor = Monitor(ERROR, on_event=lambda seen: told.append((seen.cycle, seen.event)))
+    list(monitor.watch(noisy(np.full(70, 50.0), 3)))
+    list(monitor.watch(np.full(2 * DEAD, 50.0)))
+    assert told == [(70 + DEAD, "dead sensor")]
+    assert monitor.state["dead"]
+    told.clear()
+    monitor.reset()
+    for cycle, peak in enumerate(noisy(np.resize([40.0, 50.0, 60.0], 300), 4)):
+        monitor.skip() if cycle == 100 else monitor.update(peak)
+    assert told == [(101, "missing")]
+    assert monitor.state["missing"] == 1
+
+
+@pytest.mark.parametrize("peak", [-1.0, np.nan, np.inf])
+def test_bad_peaks_are_named_and_not_counted(peak):
+    """A reading that is no force raises; the monitor goes on as if it had not come."""
+    monitor = Monitor(ERROR)
+    monitor.update(40.0)
+    with pytest.raises(DiagnosisError, match="cycle 2: peak"):
+        monitor.update(peak)
+    assert monitor.update(40.0).cycle == 2
+
+
+def test_the_sensor_error_must_be_stated():
+    """A perfect sensor has no scale by which to judge."""
+    with pytest.raises(DiagnosisError, match="allowed: above 0"):
+        Monitor(0.0)
+
+
+def test_the_log_holds_every_event(tmp_path):
+    """One line an event, appended; a file that can't be written is named."""
+    peaks = noisy(np.concatenate([settled(3.2, 60), settled(3.9, 60)]), 6)
+    for _ in range(2):
+        with EventLog(tmp_path / "log.csv") as log:
+            for seen in Monitor(ERROR).watch(peaks):
+                log.note(seen)
+    lines = (tmp_path / "log.csv").read_text().splitlines()
+    assert lines[0] == "cycle,event,peak_N,amplitude_N"
+    assert sum("alarm" in line for line in lines) >= 2
+    with pytest.raises(ChaosgymError, match="can't be written"):
+        EventLog(tmp_path / "no" / "log.csv")
+
+
+def test_monitors_side_by_side_are_monitors():
+    """The sums of three sensors, one of which starts anew on the way, are those of a monitor each, bit for bit."""
+    peaks = 50.0 + np.random.default_rng(0).uniform(-4.0, 4.0, (40, 3))
+    sums, monitors = RepeatSums(3), [Monitor(5.0) for _ in range(3)]
+    for cycle, row in enumerate(peaks):
+        if cycle == 15:
+            sums.forget(np.array([1]))
+            monitors[1].reset()
+        sums.add(np.arange(3), row, 5.0)
+        levels = [monitor.update(float(peak)).level for monitor, peak in zip(monitors, row, strict=True)]
+        assert np.array_equal(sums.level(np.arange(3)), levels)

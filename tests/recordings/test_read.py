@@ -1,0 +1,216 @@
+"""Recorders' files: every dialect gives the same forces, and what can't be a force is never taken for one."""
+
+import hashlib
+import io
+import os
+import sys
+import threading
+
+import numpy as np
+import pyarrow as pa
+import pyarrow.parquet as pq
+import pytest
+from scipy.io import savemat, wavfile
+
+from chaosgym.errors import DiagnosisError
+from chaosgym.recordings.columns import choose_force, forces
+from chaosgym.recordings.read import read_recording
+
+FORCES = [48.25, 49.5, 47.75, 48.0, 50.25]
+
+DIALECTS = {
+    "plain": "48.25\n49.5\n47.75\n48\n50.25\n",
+    "heading": "peak force [N]\n48.25\n49.5\n47.75\n48\n50.25\n",
+    "decimal comma": "48,25\n49,5\n47,75\n48,0\n50,25\n",
+    "decimal comma and heading": "Kraft [N]\n48,25\n49,5\n47,75\n48,0\n50,25\n",
+    "Excel in half of Europe": "Zyklus;Kraft [N]\n1;48,25\n2;49,5\n3;47,75\n4;48\n5;50,25\n",
+    "kilonewton": "cycle,force (kN)\n1,0.04825\n2,0.0495\n3,0.04775\n4,0.048\n5,0.05025\n",
+    "unit in the name": "stamp,peak_N\n17000000,48.25\n17000001,49.5\n17000003,47.75\n17000004,48\n17000005,50.25\n",
+    "a speed beside": "rpm,peak_N\n1140,48.25\n1141,49.5\n1139,47.75\n1140,48\n1140,50.25\n",
+    "tabs": "no\tforce / N\n1\t48.25\n2\t49.5\n3\t47.75\n4\t48\n5\t50.25\n",
+    "blanks": "# recorder 7\n 1   48.25\n 2   49.5\n 3   47.75\n 4   48.0\n 5   50.25\n",
+    "a line of units": "Nr;F\n-;N\n1;48.25\n2;49.5\n3;47.75\n4;48\n5;50.25\n",
+    "comments and blank lines": "% rig A\n\n# gain 3\nF [N]\n48.25\n\n49.5\n47.75\n48\n50.25\n\n",
+    "quotes": '"cycle","F [N]"\n1,"48.25"\n2,"49.5"\n3,"47.75"\n4,"48"\n5,"50.25"\n',
+    "preamble": "Recorder X100\nSerial: 4711\ncycle,F [N]\n1,48.25\n2,49.5\n3,47.75\n4,48\n5,50.25\n",
+}
+
+
+@pytest.mark.parametrize("dialect", DIALECTS)
+@pytest.mark.parametrize("encoding", ["utf-8", "utf-8-sig", "utf-16"])
+def test_every_dialect_gives_the_same_forces(dialect, encoding, tmp_path):
+    """Delimiter, decimal mark, heading, units, comments and encoding do not change the forces in newton."""
+    path = tmp_path / "Spitzenkräfte 测量.csv"
+    path.write_bytes(DIALECTS[dialect].encode(encoding))
+    signal = choose_force(read_recording(path))
+    np.testing.assert_allclose(signal.values, FORCES, rtol=1e-12)
+
+
+def binary(kind, path):
+    """Write the forces in a binary format."""
+    if kind == "parquet":
+        pq.write_table(pa.table({"cycle": range(5), "force [N]": FORCES}), path)
+    elif kind == "npy":
+        np.save(path, np.array(FORCES))
+    elif kind == "mat":
+        savemat(path, {"force": np.array(FORCES), "comment": "rig A"})
+    else:
+        wavfile.write(path, 1000, np.array(FORCES, dtype=np.float32))
+
+
+@pytest.mark.parametrize("kind", ["parquet", "npy", "mat", "wav"])
+def test_binary_formats_give_the_same_forces(kind, tmp_path):
+    """Told by their first bytes, whatever the name ends in."""
+    path = tmp_path / f"record.{kind}"
+    binary(kind, path)
+    path = path.rename(tmp_path / "record")
+    np.testing.assert_allclose(choose_force(read_recording(path)).values, FORCES, rtol=1e-6)
+
+
+def test_standard_input_is_read_like_a_file(monkeypatch):
+    """``-`` is standard input."""
+    monkeypatch.setattr(sys, "stdin", io.StringIO(DIALECTS["Excel in half of Europe"]))
+    assert choose_force(read_recording("-")).values.tolist() == FORCES
+
+
+def test_a_hash_tells_files_apart(tmp_path):
+    """The hash is that of the bytes, as sha256sum prints it."""
+    path = tmp_path / "a.csv"
+    path.write_bytes(b"1\n2\n2\n")
+    assert read_recording(path).sha256 == hashlib.sha256(b"1\n2\n2\n").hexdigest()
+
+
+MANY = "\n".join(",".join(row) for row in ([f"c{k}" for k in range(1000)], ["1"] * 1000, ["2"] * 1000, ["1"] * 1000))
+
+
+@pytest.mark.parametrize(
+    ("text", "message"),
+    [
+        ("1\n2\nx\n", r"line 3: 'x' is not a finite number"),
+        ("1\nnan\n3\n", r"line 2: 'nan' is not a finite number"),
+        ("40\n\n\nforty\n", r"line 4: 'forty'"),
+        ("peak force [N]\n", "no numbers"),
+        ("", "no numbers"),
+        ("a [N],a [N]\n1,2\n", "two columns alike"),
+        ("left [N],right [N]\n1,2\n3,1\n", "several columns that could be forces: 'left', 'right'; use --column"),
+        (MANY, r"could be forces: 'c0', .* 'c11' and 988 more; use --column NAME"),
+        ("cycle,rpm\n1,1140\n2,1141\n3,1139\n", "no column that could be a force"),
+        ("1\n2\n3\n4\n5\n6\n", "rises like a counter"),
+        ("angle [deg]\n1\n2\n1\n", "no column that could be a force"),
+        ("a,b\n1,2\n1,2,3\n", "line 3 has 3 columns; allowed: 2"),
+    ],
+)
+def test_unusable_files_say_why(text, message, tmp_path):
+    """One line that names the file and the line, or what to do."""
+    path = tmp_path / "peaks.csv"
+    path.write_text(text)
+    with pytest.raises(DiagnosisError, match=message) as error:
+        choose_force(read_recording(path))
+    assert "\n" not in str(error.value)
+
+
+def test_a_column_is_taken_by_name_number_and_unit(tmp_path):
+    """``--column`` takes the name without its unit, or a number; ``--unit`` says what the file does not."""
+    path = tmp_path / "two.csv"
+    path.write_text("left,right\n1,2\n3,1\n2,2\n")
+    assert choose_force(read_recording(path), "RIGHT").values.tolist() == [2.0, 1.0, 2.0]
+    assert choose_force(read_recording(path), "1", "kN").values.tolist() == [1000.0, 3000.0, 2000.0]
+    with pytest.raises(DiagnosisError, match="no column 'middle'; its columns of numbers: 'left', 'right'"):
+        choose_force(read_recording(path), "middle")
+    assert choose_force(read_recording(path), "left", "V").unit == "V"
+    with pytest.raises(DiagnosisError, match="'left' is in furlong, no unit that is known; allowed: N"):
+        choose_force(read_recording(path), "left", "furlong")
+
+
+@pytest.mark.parametrize(
+    ("title", "scale", "values", "unit"),
+    [
+        ("Acc [g]", None, [1.0, 3.0, 2.0], "g"),
+        ("F [daN]", None, [10.0, 30.0, 20.0], "N"),
+        ("Channel A [mV]", "100 mV/N", [0.01, 0.03, 0.02], "N"),
+        ("Channel A [V]", "100 mV/N", [10.0, 30.0, 20.0], "N"),
+        ("Channel A [V]", "2 kN/V", [2000.0, 6000.0, 4000.0], "N"),
+        ("Channel A [mV]", "10 mV/g", [0.1, 0.3, 0.2], "g"),
+        ("Channel A [mV]", "10 mV/m/s2", [0.1, 0.3, 0.2], "m/s2"),
+        ("plain", "50 N/FS", [50.0, 150.0, 100.0], "N"),
+    ],
+)
+def test_other_quantities_keep_their_unit_or_are_calibrated(title, scale, values, unit, tmp_path):
+    """An acceleration stays in g; a voltage becomes a force by the sensor's sensitivity or the amplifier's range."""
+    path = tmp_path / "record.csv"
+    path.write_text(f"{title}\n1\n3\n2\n")
+    signal = choose_force(read_recording(path), scale=scale)
+    np.testing.assert_allclose(signal.values, values)
+    assert signal.unit == unit
+
+
+@pytest.mark.parametrize("scale", ["mV/N", "0 mV/N", "-3 mV/N", "nan mV/N", "1e999 mV/N", "3 apples/pear", "3 g/N"])
+def test_what_is_no_calibration_is_refused(scale, tmp_path):
+    """One line that says what is allowed."""
+    path = tmp_path / "record.csv"
+    path.write_text("Channel A [mV]\n1\n3\n2\n")
+    with pytest.raises(DiagnosisError, match=r"--scale .* (is no calibration|does not fit)"):
+        choose_force(read_recording(path), scale=scale)
+
+
+def test_a_counter_is_no_force_even_when_it_is_named(tmp_path):
+    """Cycle numbers as forces would give a life, and a wrong one."""
+    path = tmp_path / "counter.csv"
+    path.write_text("cycle,peak\n" + "".join(f"{k},{40 + k % 3}\n" for k in range(30)))
+    with pytest.raises(DiagnosisError, match="equal steps and can't be a force"):
+        choose_force(read_recording(path), "cycle")
+
+
+def test_runs_are_columns_of_unequal_length(tmp_path):
+    """A run that ends early ends in blanks; a blank between two readings is refused."""
+    path = tmp_path / "runs.csv"
+    path.write_text("calm,wild\n1,2\n3,1\n2,\n")
+    assert [signal.values.tolist() for signal in forces(read_recording(path))] == [[1.0, 3.0, 2.0], [2.0, 1.0]]
+    path.write_text("calm,wild\n1,2\n3,\n2,1\n")
+    with pytest.raises(DiagnosisError, match="line 3: a blank between two numbers"):
+        forces(read_recording(path))
+
+
+@pytest.mark.parametrize(("row", "count"), [('"{}', 180), ('"{},1', 180), ('{},"1', 180)])
+@pytest.mark.parametrize("every", [1, 3, 180])
+def test_no_reading_is_dropped_for_a_quote(tmp_path, row, count, every):
+    """A line with a quote that is not closed is counted and said, wherever it stands and however many there are."""
+    plain = row.replace('"', "")
+    lines = [(row if i % every == 0 else plain).format(100 + i % 3) for i in range(count)]
+    path = tmp_path / "torn.csv"
+    path.write_text("force [N]" + ",b" * plain.count(",") + "\n" + "\n".join(lines) + "\n")
+    torn = len(range(0, count, every))
+    with pytest.raises(DiagnosisError, match=f"line 2: a quote is not closed, as in {torn} of {count} lines"):
+        choose_force(read_recording(path), "force")
+
+
+@pytest.mark.skipif(not hasattr(os, "mkfifo"), reason="named pipes")
+def test_pipes_and_devices_never_hang(tmp_path):
+    """A pipe that nothing writes into and a device are refused within seconds; a pipe that is written is read."""
+    pipe = tmp_path / "pipe"
+    os.mkfifo(pipe)
+    with pytest.raises(DiagnosisError, match="into which nothing was written"):
+        read_recording(pipe)
+    with pytest.raises(DiagnosisError, match="is a device"):
+        read_recording("/dev/zero")
+    writer = threading.Thread(target=pipe.write_text, args=("48.5\n47\n48\n" * 20000,))
+    writer.start()
+    assert len(choose_force(read_recording(pipe)).values) == 60000
+    writer.join()
+
+
+def test_a_file_that_is_too_large_is_refused_at_once(tmp_path):
+    """2 GiB, of which nothing is read."""
+    path = tmp_path / "large.csv"
+    with open(path, "wb") as file:
+        file.truncate(2**31)
+    with pytest.raises(DiagnosisError, match=r"holds 2\.0 GiB; allowed: up to 1 GiB"):
+        read_recording(path)
+
+
+def test_a_text_of_very_many_columns_is_refused_at_once(tmp_path):
+    """As many as no recorder has channels: one line that says how many there may be."""
+    path = tmp_path / "wide.csv"
+    path.write_text("\n".join(",".join(str(place % 7 + row) for place in range(5000)) for row in range(3)))
+    with pytest.raises(DiagnosisError, match="has 5000 columns; allowed: 4096"):
+        read_recording(path)
