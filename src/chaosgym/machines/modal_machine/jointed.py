@@ -171,10 +171,10 @@ class JointedMachine(Machine):
     @property
     def flexible(self) -> Flexible | None:
         """Its equations between contacts; None with friction, which acts beside the forces of the joints."""
-        return None if self.rubbing else self._equations
+        return None if self.rubbing else self.without_friction
 
     @property
-    def _equations(self) -> Flexible:
+    def without_friction(self) -> Flexible:
         """The structure's equations between contacts, without friction."""
         return Flexible(self.sets.stiffness, self.sets.damping, self.sets.shape, *self._drive())
 
@@ -285,7 +285,7 @@ class JointedMachine(Machine):
         if sets.sliders.speed.any():
             return 0.0
         surfaces = sets.springs, sets.dampers, self.stops
-        return self._equations.passive_share(*surfaces, self.cycle_period, states, peak_force)
+        return self.without_friction.passive_share(*surfaces, self.cycle_period, states, peak_force)
 
 
 @lru_cache(maxsize=64)
