@@ -83,9 +83,9 @@ def _settled(machine, start):
         record = chaosgym.simulate(machine, SEEN, state, transient=cycles)
         path = np.vstack([record.section, record.final_state.coordinates])
         size = np.abs(path).max(axis=0)
-        for period in range(1, SEEN // 2):
-            if np.all(np.abs(path[period:] - path[:-period]) < 1e-4 * size):
-                return period, float(record.peak_force.max())
+        misses = [np.max(np.abs(path[period:] - path[:-period]) / size) for period in range(1, SEEN // 2)]
+        if min(misses) < 1e-6:
+            return 1 + int(np.argmax(np.array(misses) < 1e-3)), float(record.peak_force.max())
         state = record.final_state
     return 0, float(record.peak_force.max())
 

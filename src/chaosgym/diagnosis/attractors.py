@@ -214,6 +214,11 @@ class Attractors:
             ways.insert(0, f"{one.random_starts} of {self.starts} random starts ({share:.0%}; {low:.0%} to {high:.0%})")
         return f"from {', '.join(ways)}"
 
+    @property
+    def lines(self) -> tuple[str, ...]:
+        """What people are told: the other motions, and how far was looked."""
+        return (*self.other_motions, f"looked: {self.searched}")
+
     def as_dict(self) -> dict[str, Any]:
         """Return plain values for JSON."""
         shares = [self.share(one) if self.starts else None for one in self.motions]
@@ -339,10 +344,32 @@ def attractors(
     )
 
 
+class Mapper:
+    """Tells on which motion of a search a state settles; motions that are new are added behind the others."""
+
+    def __init__(self, machine: Machine, found: Attractors, workers: int | None = None) -> None:
+        self._search = _Search(machine, found.box, found.budget, workers)
+        self._search.motions = list(found.motions)
+
+    @property
+    def motions(self) -> tuple[Attractor, ...]:
+        """Those of the search, then those that are new."""
+        return tuple(self._search.motions)
+
+    def reached(self, states: Sequence[Array | None]) -> list[int | None]:
+        """Number of the motion that each state (n_states,) settles on; None where it does not, or is None."""
+        places: dict[int, int] = {}
+        there = [(number, state) for number, state in enumerate(states) if state is not None]
+        self._search.settle([None] * len(there), [state for _, state in there], places)
+        by_number = {number: places.get(at) for at, (number, _) in enumerate(there)}
+        return [by_number.get(number) for number in range(len(states))]
+
+
 @dataclass
 class _Start:
-    """A start on its way: its name (None if random), where it is, the section of its last stage."""
+    """A start on its way: its number and name (None if random), where it is, the section of its last stage."""
 
+    number: int
     name: str | None
     motion: MotionState
     record: CycleRecord | None = None
@@ -356,8 +383,9 @@ class _Search:
         self._machine, self._budget, self._workers = machine, budget, workers
         with np.errstate(divide="ignore"):
             self._weight = np.where(box.scale > 0.0, 1.0 / box.scale, 0.0) / np.sqrt(max(np.sum(box.scale > 0.0), 1))
-        self._motions: list[Attractor] = []
+        self.motions: list[Attractor] = []
         self._diagnoses = 0
+        self._places: dict[int, int] = {}
         self.lost: list[str | None] = []
         self.cycles = 0
 
@@ -367,19 +395,22 @@ class _Search:
         if motion is None:
             self.lost.append(begun)
         else:
-            self._motions.append(replace(motion, from_starts=(begun,)))
+            self.motions.append(replace(motion, from_starts=(begun,)))
 
     def sorted_motions(self) -> tuple[Attractor, ...]:
         """That of the verdict, then by share."""
-        first, *others = self._motions
+        first, *others = self.motions
         return (first, *sorted(others, key=lambda one: -one.random_starts))
 
-    def settle(self, names: Sequence[str | None], states: Sequence[Array]) -> None:
-        """Run all starts until each is on a motion or the budget ends."""
+    def settle(
+        self, names: Sequence[str | None], states: Sequence[Array], places: dict[int, int] | None = None
+    ) -> None:
+        """Run all starts until each is on a motion, whose number ``places`` then has, or the budget ends."""
+        self._places = {} if places is None else places
         bouncing = rest_state(self._machine).bouncing
         live = [
-            _Start(name, MotionState(np.array(state), bouncing.copy()))
-            for name, state in zip(names, states, strict=True)
+            _Start(number, name, MotionState(np.array(state), bouncing.copy()))
+            for number, (name, state) in enumerate(zip(names, states, strict=True))
         ]
         for stage in _stages(self._budget):
             parallel_map(lambda start, until=stage: self._run(start, until), live, workers=self._workers)
@@ -422,19 +453,20 @@ class _Search:
         return waiting
 
     def _count(self, start: _Start, place: int) -> None:
-        motion = self._motions[place]
+        self._places[start.number] = place
+        motion = self.motions[place]
         if start.name is None:
             motion = replace(motion, random_starts=motion.random_starts + 1)
         else:
             motion = replace(motion, from_starts=(*motion.from_starts, start.name))
-        self._motions[place] = motion
+        self.motions[place] = motion
 
     def _distances(self, states: Array) -> Array:
         """Smallest distance of each state (k, n) from each of the motions: (motions, k)."""
         return np.array(
             [
                 np.min(np.linalg.norm(self._weight * (states[:, None] - one.states), axis=2), axis=1)
-                for one in self._motions
+                for one in self.motions
             ]
         )
 
@@ -444,19 +476,19 @@ class _Search:
     def _arrived(self, start: _Start) -> int | None:
         """Number of the motion on which a start is, or None."""
         record = start.record
-        if not self._motions or record is None:
+        if not self.motions or record is None:
             return None
         path = np.vstack([record.section[-TAIL:], record.final_state.coordinates])
-        orbits = [place for place, one in enumerate(self._motions) if one.period]
+        orbits = [place for place, one in enumerate(self.motions) if one.period]
         if orbits:
             now = self._distances(path[-1:])[:, 0]
             nearest = min(orbits, key=lambda place: now[place])
-            one = self._motions[nearest]
+            one = self.motions[nearest]
             beside = min((now[place] for place in orbits if place != nearest), default=np.inf)
             near = now[nearest] < ARRIVED * self._size(one) and now[nearest] <= APART * beside
             if near and self._nears(path, one):
                 return nearest
-        for place, one in enumerate(self._motions):
+        for place, one in enumerate(self.motions):
             if one.orbit is None and self._on_set(path, record, one):
                 return place
         return None
@@ -536,18 +568,18 @@ class _Search:
         """Number of a motion, which is added unless it is known."""
         if motion is None:
             return None
-        for place, one in enumerate(self._motions):
+        for place, one in enumerate(self.motions):
             if (one.period, one.neutral) != (motion.period, motion.neutral):
                 continue
             if one.neutral:
-                self._motions[place] = replace(one, peaks=np.maximum(one.peaks, motion.peaks))
+                self.motions[place] = replace(one, peaks=np.maximum(one.peaks, motion.peaks))
                 return place
             near = one.period and self._distances(motion.state[None])[place, 0] < SAME * self._size(one)
             alike = np.allclose(one.peaks, motion.peaks, rtol=SAME, atol=SAME * one.largest_peak)
             if near or (one.period and one.orbit is None and alike):
                 return place
-        self._motions.append(motion)
-        return len(self._motions) - 1
+        self.motions.append(motion)
+        return len(self.motions) - 1
 
 
 def _stages(budget: int) -> list[int]:
