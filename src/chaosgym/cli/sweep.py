@@ -74,6 +74,8 @@ def sweep(
     from chaosgym.sweeps.plan import default_axes
 
     picture = picture_path(plot, f"sweep-{machine.name}")
+    if machine.initial_state:
+        raise click.UsageError("the labels of a sweep are those of runs from rest: leave --initial-state out")
     sizes = {"random": random_size, "sobol": sobol_size, "crosses": cross_count}
     given = [name for name, size in sizes.items() if size]
     if len(given) > 1:

@@ -87,14 +87,25 @@ def reduced(machine: Any) -> Any:
     values = {each.name: getattr(machine, each.name) for each in fields(machine)}
     # what is the file's own comes back with it
     own = {name: value for name, value in values.items() if value is not getattr(kind, name, None)}
-    return _restored, (machine.name, {**own, "definition": machine.definition})
+    return _restored, (machine.name, {**own, "definition": machine.definition}, machine.initial_state)
 
 
-def _restored(path: str, values: Mapping[str, Any]) -> Machine:
+def _restored(path: str, values: Mapping[str, Any], initial_state: tuple[float, ...]) -> Machine:
     from chaosgym.machines.machine_file import machine_class
 
     kind: Any = machine_class(path)
     if kind.definition != values["definition"]:
         raise ParameterError(f"{path} has changed: it is not the machine that was kept")
     machine: Machine = kind(**values)
-    return machine
+    return machine.from_state(initial_state)
+
+
+def state_of(operation: Mapping[str, Any], machine: Machine) -> tuple[float, ...]:
+    """Initial state that the table [operation] of a file states; empty for rest.
+
+    Raises
+    ------
+    ParameterError
+        If it has another length than the machine's states.
+    """
+    return machine.from_state(operation.get("initial_state", ())).initial_state
