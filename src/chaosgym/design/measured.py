@@ -87,7 +87,7 @@ class MeasuredPeaks:
         found, asked = self.evaluation, self.criteria
         lines = [
             self.headline,
-            f"  {self.verdict.diagnosis.reason}",
+            *(f"  {line}" for line in self.verdict.diagnosis.statement.lines()[1:]),
             *(f"  {note}" for note in self.verdict.notes),
             *([self.doubt] if self.doubt else []),
             f"life              {found.life:.4g} million cycles, {found.life_interval.low:.4g} to "
