@@ -7,8 +7,9 @@ from typing import Any, ClassVar
 
 import numpy as np
 
+from chaosgym.machines.flexible_model import Modes, flexible_model
 from chaosgym.machines.machine import Number, Option
-from chaosgym.machines.modal_impact import ModalImpactMachine, Modes, flexible_model
+from chaosgym.machines.modal_impact import ModalImpactMachine
 from chaosgym.machines.parameters import parameter
 
 

@@ -11,10 +11,10 @@ from numpy.typing import NDArray
 
 from chaosgym.arrays import Array
 from chaosgym.core.modal_model import ModalImpactModel
+from chaosgym.machines.flexible_model import flexible_model
 from chaosgym.machines.impact_beam.modes import modal_analysis, modal_curvatures, static_tip_deflection
 from chaosgym.machines.impact_beam.parameters import BeamParameters
 from chaosgym.machines.integrators import TIGHTEST_EVENTS, ExactEvents
-from chaosgym.machines.modal_impact import flexible_model
 
 if TYPE_CHECKING:
     from chaosgym.machines.batch import CompiledBatch

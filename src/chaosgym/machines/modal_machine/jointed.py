@@ -13,11 +13,11 @@ from chaosgym.core.cycle import CycleArrays, cycle_arrays
 from chaosgym.core.tangent import Tangents, no_tangents
 from chaosgym.errors import ParameterError
 from chaosgym.machines.abilities import Flexible
+from chaosgym.machines.flexible_model import Modes, with_rigid_bodies
 from chaosgym.machines.integrators import ExactEvents, Integrator
 from chaosgym.machines.joint_sets import PressedSets, Sliders
 from chaosgym.machines.joint_tables import JointTables
 from chaosgym.machines.machine import Machine, Number, Option
-from chaosgym.machines.modal_impact import Modes, with_rigid_bodies
 from chaosgym.machines.modal_machine.drive import Drive, checked, drive_notes, modal_drive
 from chaosgym.machines.modal_machine.friction import OF_FRICTION
 from chaosgym.machines.modal_machine.machine import as_there, rigid_note, turning_note

@@ -16,9 +16,10 @@ from chaosgym.arrays import Array
 from chaosgym.core.joints.tables import SLOW
 from chaosgym.core.modal_model import ModalImpactModel
 from chaosgym.errors import ParameterError
+from chaosgym.machines.flexible_model import Modes, Stop, flexible_model
 from chaosgym.machines.machine import Number, Option
 from chaosgym.machines.modal_blocks import RIGID_SHARE, nearly_rigid
-from chaosgym.machines.modal_impact import ModalImpactMachine, Modes, Stop, flexible_model
+from chaosgym.machines.modal_impact import ModalImpactMachine
 from chaosgym.machines.modal_machine.drive import Drive, checked, drive_notes, modal_drive
 from chaosgym.machines.modal_machine.structure import Structure
 from chaosgym.machines.parameters import assumed, described_as, parameter, parameters_of

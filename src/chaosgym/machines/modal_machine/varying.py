@@ -25,8 +25,8 @@ from chaosgym.errors import ParameterError
 from chaosgym.machines.binned.equations import Contact, Held, held, middles_and_nodes
 from chaosgym.machines.binned.machine import BinnedMachine
 from chaosgym.machines.binned.model import KEPT_BYTES
+from chaosgym.machines.flexible_model import Modes, with_rigid_bodies
 from chaosgym.machines.machine import Option, TaskDefaults
-from chaosgym.machines.modal_impact import Modes, with_rigid_bodies
 from chaosgym.machines.modal_machine.drive import Drive, checked, drive_notes, modal_drive
 from chaosgym.machines.modal_machine.machine import ModalMachine, as_there, rigid_note, turning_note
 from chaosgym.machines.modal_machine.structure import Structure
