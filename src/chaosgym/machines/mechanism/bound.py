@@ -2,20 +2,17 @@
 
 import math
 from functools import lru_cache
-from typing import TYPE_CHECKING
 
 import numpy as np
 
 from chaosgym.machines.mechanism.equations import assembled
 from chaosgym.machines.mechanism.joints import ACROSS
 from chaosgym.machines.mechanism.nominal import even_angles
-
-if TYPE_CHECKING:
-    from chaosgym.machines.mechanism.machine import MechanismMachine
+from chaosgym.machines.mechanism.opened import OpenedMechanism
 
 
 @lru_cache(maxsize=256)
-def heaviest_load(machine: "MechanismMachine") -> float:
+def heaviest_load(machine: OpenedMechanism) -> float:
     """Ten times the largest load [N] of a gap in the nominal motion."""
     powers = assembled(machine.scaled(), machine.revolution, matrices=False).load_at(even_angles(72))
     across = [
@@ -26,7 +23,7 @@ def heaviest_load(machine: "MechanismMachine") -> float:
     )
 
 
-def largest_force(machine: "MechanismMachine") -> float:
+def largest_force(machine: OpenedMechanism) -> float:
     """Force [N] of an impact of all masses at ten times the speed of the nominal motion."""
     mechanism = machine.scaled()
     theta = even_angles(72)
