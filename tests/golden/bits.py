@@ -22,7 +22,7 @@ from chaosgym import ExactEvents, ImpactBeam, SliderCrank
 from chaosgym.core.modal_model import ModalImpactModel
 from chaosgym.core.tangent import Tangents
 from chaosgym.machines import Machine
-from chaosgym.machines.modal_impact import with_tables
+from chaosgym.machines.flexible_model import with_tables
 
 STORED = Path(__file__).with_name("bits.npz")
 
