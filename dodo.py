@@ -85,7 +85,7 @@ TASKS = ["src/chaosgym/envs/levels.py", "src/chaosgym/envs/judge.py"]
 TASKS += sorted(map(str, Path("src/chaosgym/machines").glob("*/task_defaults.py")))
 """What says how machines are used in the environments, and when they cost."""
 
-RECIPES = "src/chaosgym/sweeps/datasets.toml"
+RECIPES = "datasets/datasets.toml"
 DATASETS = tuple(tomllib.loads(Path(RECIPES).read_text()))
 """Machines whose datasets are made; the options stand in ``RECIPES``."""
 
@@ -168,7 +168,7 @@ def task_dataset():
     """Labelled crosses of independent machines; a sample of them is kept."""
     for machine in DATASETS:
         run = f"{RUNS}/{machine}"
-        build = f"chaosgym dataset build {machine} --no-check --out {run}"
+        build = f"python -m benchmarks build-dataset {machine} --no-check --out {run}"
         made = [*kept(machine), f"datasets/{machine}/CARD.md"]
         yield task(machine, [RECIPES], made, build, f"python -m benchmarks ship-dataset {run}")
 
@@ -178,7 +178,7 @@ def task_classifier():
     for machine in DATASETS:
         used = [*kept(machine), *sources("src/chaosgym/classifier")]
         made, run, data = f"src/chaosgym/weights/{machine}.npz", f"{RUNS}/classifier-{machine}", whole(machine)
-        build = f"chaosgym dataset build {machine} --out {data}"
+        build = f"python -m benchmarks build-dataset {machine} --out {data}"
         train = f"chaosgym train-classifier --data {data} --out {run}"
         yield task(machine, used, [made], build, f"rm -rf {run}", train, f"cp {run}/*.npz {made}")
 
@@ -187,7 +187,7 @@ def task_signs():
     """How often the signs of chaos of thesis 5.3 were right on the whole datasets."""
     used = [file for machine in DATASETS for file in kept(machine)]
     used += ["src/chaosgym/diagnosis/precursors.py", "benchmarks/sweeps/signs.py"]
-    builds = [f"chaosgym dataset build {machine} --out {whole(machine)}" for machine in DATASETS]
+    builds = [f"python -m benchmarks build-dataset {machine} --out {whole(machine)}" for machine in DATASETS]
     count = "python -m benchmarks.sweeps.signs " + " ".join(map(whole, DATASETS))
     yield task("rates", used, ["src/chaosgym/diagnosis/signs.json"], *builds, count)
 

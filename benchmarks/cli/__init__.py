@@ -6,6 +6,7 @@ from typing import Any
 import click
 
 from benchmarks.cli.bench import bench
+from benchmarks.cli.datasets import build_dataset
 from benchmarks.cli.environments import COMMANDS
 from benchmarks.cli.house import house
 from chaosgym.cli import run_command
@@ -192,6 +193,7 @@ for command in (
     margins,
     learned,
     check,
+    build_dataset,
     ship,
     types,
     cost,

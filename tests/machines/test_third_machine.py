@@ -88,9 +88,8 @@ def test_classify_with_and_without_a_trained_model(sweep, tmp_path):
 
 
 def test_dataset(sweep, tmp_path):
-    """A sweep is described, has a card, and is drawn."""
+    """A sweep is described and drawn."""
     assert answer("dataset", "info", sweep)["machine"] == NAME
-    assert run("dataset", "card", sweep).exit_code == 0
     assert run("dataset", "map", sweep, "--out", tmp_path / "map.png").exit_code == 0
 
 
