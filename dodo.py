@@ -266,13 +266,15 @@ def task_picture():
     draw = f"python -m benchmarks curves --table {curves} --figure {drawn}"
     yield task("training", [curves, "benchmarks/envs/curves.py"], [drawn], draw)
     for machine in DATASETS:
-        for kind, options in (("tradeoff", LADDER_OPTIONS[machine]), ("stability", "")):
-            folder = "docs/development" if kind == "stability" else "docs"
+        for kind, program, options, folder, own in (
+            ("tradeoff", "chaosgym", LADDER_OPTIONS[machine], "docs", "src/chaosgym/fidelity"),
+            ("stability", "python -m benchmarks", "", "docs/development", "benchmarks/fidelity"),
+        ):
             made, run = f"{folder}/{kind}-{machine}.png", f"{RUNS}/{kind}-{machine}"
-            measure = f"chaosgym {kind} {machine} {options} --out {run}"
+            measure = f"{program} {kind} {machine} {options} --out {run}"
             copy = f"cp {run}/{kind}.png {made}"
             rungs = f"src/chaosgym/machines/{machine.replace('-', '_')}/parameters.py"
-            used = [rungs, *sources("src/chaosgym/fidelity")]
+            used = [rungs, *sources(own)]
             yield task(f"{kind}-{machine}", used, [made], f"mkdir -p {run}", measure, copy)
 
 

@@ -8,6 +8,7 @@ import click
 from benchmarks.cli.bench import bench
 from benchmarks.cli.datasets import build_dataset
 from benchmarks.cli.environments import COMMANDS
+from benchmarks.cli.fidelity import stability
 from benchmarks.cli.house import house
 from chaosgym.cli import run_command
 from chaosgym.cli.machine_options import machine_command
@@ -201,6 +202,7 @@ for command in (
     monitors,
     general,
     exponents,
+    stability,
 ):
     app.add_command(command)
 for command in COMMANDS:

@@ -78,7 +78,6 @@ LONG = {
     "branch": 'impact-beam --along "speed=17:18.2 Hz:5" --workers 1 --out o.csv;'
     'impact-beam --along "speed=17.3:17.7 Hz:3" --against "clearance=0.120mm:0.134mm:3" --workers 1',
     "tradeoff": "impact-beam --points 1 --cycles 20 --transient 20 --budget 0.05 --workers 1",
-    "stability": "impact-beam --workers 1",
     "compare": f'{BEAM} --machines 2 --only "follow the demand" --out scores.parquet',
     "design": f"brief.toml --workers 1 --plot b.png; brief.toml other.toml --workers 1;"
     f"other.toml --workers 1 --beside {PEAKS}",

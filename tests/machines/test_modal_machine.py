@@ -365,7 +365,7 @@ def test_new_machine_writes_the_template_once(tmp_path):
 
 def test_stability_tradeoff_and_pictures_take_the_file(machine_file):
     """Every extreme ends in an answer or a named error, and a job is drawn."""
-    from chaosgym.fidelity.stability import stability_map
+    from benchmarks.fidelity.stability import stability_map
 
     machine = chaosgym.read_machine(machine_file())
     assert {cell.outcome for cell in stability_map(machine).cells} <= {"answer", "named error"}

@@ -33,7 +33,6 @@ COMMANDS = {
     "train-classifier": "classify:train_classifier",
     "design": "design:design",
     "tradeoff": "fidelity:tradeoff",
-    "stability": "fidelity:stability",
     "compare": "agents:compare",
     "run-agent": "agents:run_agent",
     "demo": "demo:demo",
@@ -43,6 +42,7 @@ COMMANDS = {
 
 MOVED = {
     "dataset build": "`python -m benchmarks build-dataset MACHINE` makes it in a clone of the repository",
+    "stability": "`python -m benchmarks stability MACHINE` measures it in a clone of the repository",
     "dataset card": "`chaosgym dataset info FOLDER` has what it wrote",
 }
 """Former commands, and what to call instead."""

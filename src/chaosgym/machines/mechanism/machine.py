@@ -76,7 +76,6 @@ class MechanismMachine(BinnedMachine):
     """Joint with friction, if there is one."""
     hertz: ClassVar[bool] = False
     """Whether all contacts are Hertzian."""
-    extremes: ClassVar[Mapping[str, Mapping[str, Any]]] = {"no gravity": {"gravity_factor": 0.0}}
 
     mechanism: Mechanism
     displayed: tuple[float, ...] = field(default=(), repr=False)

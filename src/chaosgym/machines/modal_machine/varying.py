@@ -137,7 +137,6 @@ class VaryingMachine(BinnedMachine):
     aliases: ClassVar[Mapping[str, str]] = ModalMachine.aliases
     usual_ranges: ClassVar[Mapping[str, tuple[float, float]]] = ModalMachine.usual_ranges
     options: ClassVar[Mapping[str, Option]] = ModalMachine.options
-    extremes: ClassVar[Mapping[str, Mapping[str, Any]]] = ModalMachine.extremes
     fidelity_ladder: ClassVar[Mapping[str, Mapping[str, Any]]] = {
         rung: {"matrix_update_interval": interval}
         for rung, interval in (("draft", 4.0), ("standard", 1.0), ("fine", 0.5), ("reference", 0.25))
