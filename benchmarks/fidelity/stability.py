@@ -20,6 +20,7 @@ from typing import Any, Literal, NamedTuple
 
 import numpy as np
 
+from benchmarks.fidelity.bounds import bounded_share
 from benchmarks.fidelity.extremes import extremes_of
 from chaosgym.errors import ChaosgymError
 from chaosgym.machines import Machine
@@ -184,4 +185,4 @@ def share_of_bound(record: CycleRecord) -> float:
     if not all(np.all(np.isfinite(value)) for value in values):
         return math.inf
     states = np.vstack([record.section, record.final_state.coordinates])
-    return record.machine.share_of_bound(states, record.peak_force)
+    return bounded_share(record.machine, states, record.peak_force)

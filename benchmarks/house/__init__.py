@@ -3,6 +3,8 @@
 from pathlib import Path
 from typing import Any
 
+import click
+
 import chaosgym
 from benchmarks.house.imports import Kind, circles, imports
 from benchmarks.house.options import options_by_command
@@ -20,10 +22,10 @@ def house(repeats: int = 5) -> dict[str, Any]:
     from chaosgym.machines import MACHINES
     from chaosgym.machines.machine import Machine
 
-    package = Package(Path(chaosgym.__file__).parent)
+    package, context = Package(Path(chaosgym.__file__).parent), click.Context(app)
     return {
         **of_sources(package),
-        "options": options_by_command({name: app.get_command(None, name) for name in COMMANDS}, list(MACHINES)),
+        "options": options_by_command({name: app.get_command(context, name) for name in COMMANDS}, list(MACHINES)),
         "protocol": members(Machine),
         "judging": judging(repeats),
         "journeys": {name: journey(name) for name in JOURNEYS},

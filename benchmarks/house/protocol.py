@@ -1,7 +1,9 @@
 """Members of a protocol: what one who implements it must give, and what it may give."""
 
 from inspect import get_annotations
-from typing import ClassVar, get_origin
+from typing import Any, ClassVar, get_origin
+
+_CLASS_VARIABLE: Any = ClassVar
 
 
 def members(protocol: type) -> dict[str, int]:
@@ -15,6 +17,6 @@ def members(protocol: type) -> dict[str, int]:
         if owner.__module__.partition(".")[0] == package:
             annotated = get_annotations(owner)
             every |= {name for name in (*owner.__dict__, *annotated) if not name.startswith("_")}
-            variables = {name for name, kind in annotated.items() if get_origin(kind) is ClassVar}
+            variables = {name for name, kind in annotated.items() if _CLASS_VARIABLE in (kind, get_origin(kind))}
             must |= {name for name in variables & every if not hasattr(protocol, name)}
     return {"must_give": len(must), "may_give": len(every - must)}

@@ -1,6 +1,5 @@
 """What only some machines can do or tell; the defaults are the answers of all others."""
 
-import math
 from collections.abc import Mapping
 from typing import TYPE_CHECKING, Any, ClassVar, NamedTuple, Self
 
@@ -36,33 +35,6 @@ class Flexible(NamedTuple):
     joints: NDArray[np.float64]
     drive: NDArray[np.float64]
     static: NDArray[np.float64]
-
-    def passive_share(
-        self, springs: Array, dampers: Array, stops: Array, period: float, states: Array, peak_force: Array
-    ) -> float:
-        """Largest ratio of energy and force of a run from rest to their bounds, as ``Machine.share_of_bound``.
-
-        Neither structure nor contact gives energy: only the drive does, and what preloads or offsets have stored. So
-        the root of twice the energy grows by at most the norm of the modal forces a second.
-
-        Parameters
-        ----------
-        springs, dampers, stops : (m, 2)
-            Of the upper and the lower surface of each joint [N/m], [N s/m]; their positions [m].
-        period
-            Of a cycle [s].
-        """
-        n = len(self.stiffness)
-        energy = np.sum(states[:, n : 2 * n] ** 2 + self.stiffness * states[:, :n] ** 2, axis=1)
-        load = float(np.sum(np.linalg.norm(self.drive, axis=(1, 2)))) + float(np.linalg.norm(self.static))
-        inside = np.maximum(np.stack([-stops[:, 0], stops[:, 1]], axis=1), 0.0)
-        stored = math.sqrt(float(np.sum(springs * inside**2)))
-        speed = stored + load * np.arange(1, len(states)) * period
-        if not speed.any():
-            return 0.0 if not energy.any() and not peak_force.any() else math.inf
-        surface = np.sqrt(springs) + dampers * np.linalg.norm(self.joints, axis=1)[:, None]
-        forces = peak_force / (surface.ravel() * speed[:, None])
-        return max(float(np.max(np.sqrt(energy[1:]) / speed)), float(np.max(forces)))
 
 
 class Abilities:

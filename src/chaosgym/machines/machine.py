@@ -189,18 +189,6 @@ class Machine(Abilities, ABC):
             One of ``core.status``, and the number of cycles that were finished.
         """
 
-    @abstractmethod
-    def share_of_bound(self, states: Array, peak_force: Array) -> float:
-        """Largest ratio of a run from rest to the bound that physics sets to it; at most 1 but for rounding.
-
-        Parameters
-        ----------
-        states : (cycles + 1, n_states)
-            States at the beginning of each cycle, and at the end.
-        peak_force : (cycles, sides)
-            Peak forces [N].
-        """
-
     @property
     def operating_fields(self) -> tuple[str, ...]:
         """Fields that may change from cycle to cycle: what the states stand for does not depend on them."""

@@ -344,7 +344,3 @@ class VaryingMachine(BinnedMachine):
         hertz = self.frequency_factor * self.modes.angular_frequency / (2.0 * math.pi)
         notes = turning_note(self.turning), rigid_note(hertz), rubs, *drive_notes(self.drives)
         return tuple(filter(None, notes))
-
-    def share_of_bound(self, states: Array, peak_force: Array) -> float:
-        """Return 0: sliding surfaces and varying stiffness may give any power, so that nothing bounds a run."""
-        return 0.0
