@@ -225,7 +225,7 @@ def task_jobs():
     """Jobs of the fleet's beams in Exudyn; the same command without ``rm`` goes on with a file of fewer."""
     made = "docs/data/other-simulator.jsonl"
     used = TASKS + sources("src/chaosgym/control/controllers") + [f"{SHIPPED}/ImpactBeamTolerance-v1-fleet/weights.npz"]
-    used += ["benchmarks/envs/other_simulator.py", "src/chaosgym/machines/impact_beam/exudyn_beam.py"]
+    used += ["benchmarks/envs/other_simulator.py", "src/chaosgym/envs/exudyn_beam.py"]
     yield task("other-simulator", used, [made], f"rm -f {made}", "python -m benchmarks other-simulator")
 
 

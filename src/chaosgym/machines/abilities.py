@@ -10,7 +10,6 @@ from chaosgym.arrays import Array
 from chaosgym.errors import ParameterError
 
 if TYPE_CHECKING:
-    from chaosgym.machines.batch import CompiledBatch
     from chaosgym.machines.drive_torque import DriveTorque
     from chaosgym.machines.picture import Sketch
 
@@ -41,8 +40,6 @@ class Abilities:
     """Optional part of the protocol ``Machine``."""
 
     name: ClassVar[str]
-    runs_in_exudyn: ClassVar[bool] = False
-    """Whether it has a batch in another simulator, ``exudyn_batch``."""
 
     @property
     def carries_deviations(self) -> bool:
@@ -194,15 +191,3 @@ class Abilities:
             If it has no such picture.
         """
         raise ParameterError(f"{self.name} has no picture of its links; allowed: the file of a mechanism")
-
-    def exudyn_batch(self, count: int) -> "CompiledBatch":
-        """Return ``count`` variants that move in Exudyn.
-
-        Raises
-        ------
-        ParameterError
-            If the machine has none.
-        ChaosgymError
-            If Exudyn is not installed.
-        """
-        raise ParameterError(f"{self.name} does not run in Exudyn; allowed: impact-beam")
