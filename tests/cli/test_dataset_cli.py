@@ -98,6 +98,7 @@ def test_map_is_drawn(folder, tmp_path):
         (("dataset", "map", ".", "--out", "m.png"), "holds no finished sweep"),
         (("dataset", "build", "impact-beam", "--crosses", "2"), "`python -m benchmarks build-dataset MACHINE`"),
         (("dataset", "card", "."), "`chaosgym dataset info FOLDER`"),
+        (("stability", "impact-beam"), "`python -m benchmarks stability MACHINE`"),
         (("sweep", "impact-beam", "--crosses", "3", "--random", "3", "--out", "o"), "exclude each other"),
         (
             ("sweep", "impact-beam", "--crosses", "3", "--axis", "length=0.27:0.28", "--out", "o"),
