@@ -55,6 +55,12 @@ def run(*arguments, stdin="", machine="impact-beam"):
     return code, out.getvalue(), err.getvalue()
 
 
+def test_no_machine_is_one_line():
+    """Without a word more, the command says which machines there are."""
+    result = subprocess.run([sys.executable, "-m", "chaosgym", "classify"], capture_output=True, text=True)
+    assert (result.returncode, result.stderr) == (2, "Error: give a machine: impact-beam, slider-crank\n")
+
+
 def lines_of(record):
     """Peaks, one a line."""
     return "\n".join(f"{peak:.4f}" for peak in record) + "\n"

@@ -3,6 +3,7 @@
 import os
 import sys
 from collections.abc import Iterable
+from itertools import pairwise
 from pathlib import Path
 from typing import Any
 
@@ -19,10 +20,7 @@ KERNELS = ("--follow", "--batch")
 
 def _quick_start(arguments: list[str]) -> None:
     """Run the Python source of the kernels for one record, or parameters alone: loading machine code takes longer."""
-    learned = {"--peaks", "--series"} & {*arguments} or any(
-        text == "--budget-us=0" or pair == ("--budget-us", "0")
-        for text, pair in zip(arguments, zip(arguments, [*arguments[1:], ""], strict=True), strict=True)
-    )
+    learned = {"--peaks", "--series", "--budget-us=0"} & {*arguments} or ("--budget-us", "0") in pairwise(arguments)
     if learned and not ({*KERNELS} & {*arguments} or "numba" in sys.modules):
         os.environ["NUMBA_DISABLE_JIT"] = "1"
 

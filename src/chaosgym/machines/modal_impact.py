@@ -188,12 +188,6 @@ class ModalImpactMachine(Machine):
         status, done, _ = call(advance_joints, run, rows, weights, *motion, None)
         return status, done
 
-    def share_of_bound(self, states: Array, peak_force: Array) -> float:
-        """Share of the bound of passivity; see ``Flexible.passive_share``."""
-        model = self.reduce()
-        surfaces = model.contact_stiffness[None], model.contact_damping[None], model.stops[None]
-        return self.flexible.passive_share(*surfaces, self.cycle_period, states, peak_force)
-
     def batch(self, count: int) -> "CompiledBatch":
         """Return ``count`` variants that move in one compiled call."""
         from chaosgym.machines.batch import ModalImpactBatch

@@ -14,7 +14,7 @@ from chaosgym.machines.binned.equations import Contact, Held, held, middles_and_
 from chaosgym.machines.binned.model import KEPT_BYTES, MAX_SETS
 from chaosgym.machines.drive_torque import DriveTorque
 from chaosgym.machines.mechanism.beam import fibre_stress
-from chaosgym.machines.mechanism.bound import heaviest_load, largest_force
+from chaosgym.machines.mechanism.bound import heaviest_load
 from chaosgym.machines.mechanism.clearance import ROUND
 from chaosgym.machines.mechanism.contacts import contacts_of
 from chaosgym.machines.mechanism.equations import SmallMotion, assembled, refuse_massless, small_motion
@@ -186,10 +186,6 @@ class MechanismMachine(OpenedMechanism):
     def notes(self) -> tuple[str, ...]:
         """Gaps that are not small, pins larger than links, motion that may grow, and limits of a motor."""
         return notes_of(self)
-
-    def share_of_bound(self, states: Array, peak_force: Array) -> float:
-        """Largest force, as a share of that of an impact of all masses at ten times the speed of the nominal motion."""
-        return float(peak_force.max()) / largest_force(self)
 
     def sketch(self, record: Any, rows: NDArray[np.int64], force_limit: float) -> "Sketch":
         """Links, and the motion in the gap of the monitored joint; see ``Machine.sketch``."""

@@ -53,7 +53,6 @@ class OpenedMechanism(BinnedMachine):
     """Joint with friction, if there is one."""
     hertz: ClassVar[bool] = False
     """Whether all contacts are Hertzian."""
-    extremes: ClassVar[Mapping[str, Mapping[str, Any]]] = {"no gravity": {"gravity_factor": 0.0}}
 
     mechanism: Mechanism
     displayed: tuple[float, ...] = field(default=(), repr=False)

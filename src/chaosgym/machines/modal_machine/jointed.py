@@ -171,10 +171,10 @@ class JointedMachine(Machine):
     @property
     def flexible(self) -> Flexible | None:
         """Its equations between contacts; None with friction, which acts beside the forces of the joints."""
-        return None if self.rubbing else self._equations
+        return None if self.rubbing else self.equations
 
     @property
-    def _equations(self) -> Flexible:
+    def equations(self) -> Flexible:
         """The structure's equations between contacts, without friction."""
         return Flexible(self.sets.stiffness, self.sets.damping, self.sets.shape, *self._drive())
 
@@ -275,17 +275,6 @@ class JointedMachine(Machine):
             return np.asarray(peak_force.max(axis=-1))
         first = 2 * self.joints.index(self.monitored)
         return np.asarray(peak_force[..., first : first + 2].max(axis=-1))
-
-    def share_of_bound(self, states: Array, peak_force: Array) -> float:
-        """Share of the bound of passivity; see ``Flexible.passive_share``.
-
-        Surfaces that move may give any power: then nothing bounds a run, and the share is 0.
-        """
-        sets = self.sets
-        if sets.sliders.speed.any():
-            return 0.0
-        surfaces = sets.springs, sets.dampers, self.stops
-        return self._equations.passive_share(*surfaces, self.cycle_period, states, peak_force)
 
 
 @lru_cache(maxsize=64)

@@ -84,14 +84,6 @@ class ModalMachine(ModalImpactMachine):
         "--speed-hz": Number("speed", "Hz"),
         "--clearance-mm": Number("clearance", "mm", 1e-3),
     }
-    extremes: ClassVar[Mapping[str, Mapping[str, Any]]] = {
-        "clearance 0": {"clearance": 0.0},
-        "clearance 1 m": {"clearance": 1.0},
-        "no damping at all": {"damping_factor": 0.0, "contact_damping": 0.0},
-        "100 times the damping": {"damping_factor": 100.0},
-        "no drive": {"drive_level": 0.0},
-        "1000 times the drive": {"drive_level": 1e3},
-    }
 
     turning: ClassVar[tuple[str, ...]] = ()
     """Names of joints that turn: their fields are in rad and N m, and "N" and "m" of a result mean these."""
