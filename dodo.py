@@ -279,11 +279,14 @@ def task_picture():
 
 
 def task_sample():
-    """The recording and the measured sweep that the documentation judges."""
+    """The recordings and the measured sweep that the documentation judges."""
     swept = "docs/data/sweep.csv"
     used = ["benchmarks/documentation/swept_peaks.py", "thesis/scorecard/candidates.json"]
     yield task("sweep", used, [swept], f"python -m benchmarks.documentation.swept_peaks {swept}")
     point = "--frequency-hz '30 Hz' --clearance-mm '0.127 mm' --cycles 1000 --transient 200"
+    decided = ["docs/data/periodic.csv", "docs/data/chaotic.csv"]
+    used = ["benchmarks/documentation/sample_recordings.py", "docs/machines/shaw-holmes-1983.toml"]
+    yield task("decided", used, decided, "python -m benchmarks.documentation.sample_recordings docs/data")
     made = "docs/data/peaks.csv"
     run = f"chaosgym simulate impact-beam {point} --out {made}"
     yield task("peaks", [], [made], f"rm -f {made}", run)

@@ -157,7 +157,7 @@ def test_an_answer_of_explore():
 @pytest.mark.slow
 @pytest.mark.filterwarnings("ignore:CUDA initialization")
 def test_long_answers(tmp_path, monkeypatch):
-    """The same of what takes longer; the demo with a smaller sweep and a shorter training."""
+    """The same of what takes longer; the demo with a smaller sweep and fewer machines."""
     monkeypatch.chdir(tmp_path)
     for name, value in SMALL.items():
         monkeypatch.setattr(demo, name, value)
