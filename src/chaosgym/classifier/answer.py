@@ -9,9 +9,10 @@ from dataclasses import asdict, dataclass, replace
 from itertools import product
 from typing import Any
 
-from chaosgym.diagnosis import Diagnosis, default_tolerances
+from chaosgym.diagnosis import default_tolerances
 from chaosgym.diagnosis.type_rule import CROSS, type_of_cross
 from chaosgym.machines import Machine
+from chaosgym.series import Diagnosis
 
 
 @dataclass(frozen=True, kw_only=True)
