@@ -2,9 +2,9 @@
 
 Simulated machines are read once a cycle by a sensor whose errors are normal, with a standard deviation of 0.25 N: four
 of these are the 1 N that its commands state. The beam at 19 Hz repeats every cycle. Chaos shows in one reading a cycle
-where the motion has few numbers and errors grow slowly: the impact oscillator has one degree of freedom, and at the ratio
-2.85, beyond its period doublings, errors grow e^0.5 times a cycle. Those of the beam at 30 Hz grow e^4 times, so that
-``docs/data/peaks.csv`` is undetermined.
+where few numbers make the motion and errors grow slowly. The impact oscillator has one degree of freedom, and at the
+ratio 2.85, beyond its period doublings, errors grow e^0.5 times a cycle. Those of the beam at 30 Hz grow e^4 times, so
+that ``docs/data/peaks.csv`` is undetermined.
 
     python -m benchmarks.documentation.sample_recordings docs/data
 """

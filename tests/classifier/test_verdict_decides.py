@@ -73,7 +73,7 @@ def test_commands_say_the_same_of_a_random_record(tmp_path, options):
     text, answer, verdict = printed(random_record("white 6 %", 0), tmp_path, *options)
     assert answer["nature"] == verdict["nature"] == answer["verdict"]["nature"] == "undetermined"
     assert "chaotic  " not in text
-    assert "no answer: the verdict is undetermined" in text
+    assert "no answer (the verdict is undetermined)" in text
     agrees(answer)
 
 

@@ -135,7 +135,7 @@ def _learned_lines(answer: Any) -> list[str]:
     if not chances:
         return [f"  learned: no answer: {answer.reason}"]
     told = {True: "irregular beyond the sensor's error", False: "regular to the sensor", None: "irregularity unknown"}
-    nature = answer.nature if answer.nature_probabilities else f"no answer: {answer.reason}"
+    nature = answer.nature if answer.nature_probabilities else f"no answer ({answer.reason})"
     head = f"  learned: {told[answer.irregular]}, amplitude {answer.amplitude:.3g} N; exact nature: {nature}"
     warning = [f"  warning: {answer.warning}"] if answer.warning else []
     return [head, *_bars(chances), *warning]
