@@ -4,11 +4,11 @@ import numpy as np
 import pytest
 
 from chaosgym.errors import DiagnosisError
-from chaosgym.recordings.columns import choose_force, choose_time
+from chaosgym.recordings.columns import choose_force
 from chaosgym.recordings.cycles import peaks_of_series
-from chaosgym.recordings.heading import split_unit
+from chaosgym.recordings.quantities import split_unit
 from chaosgym.recordings.read import read_recording
-from chaosgym.recordings.sampling import sampling
+from chaosgym.recordings.sampling import choose_time, sampling
 
 COUNT, STEP = 60, 5e-4
 TIME = np.arange(COUNT) * STEP

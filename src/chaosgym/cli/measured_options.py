@@ -22,7 +22,7 @@ class Reading(Quantity):
 
     def convert(self, value: Any, param: click.Parameter | None, ctx: click.Context | None) -> float:
         """Return newton, or an ``InUnit``."""
-        from chaosgym.recordings.columns import OTHERS
+        from chaosgym.recordings.quantities import OTHERS
 
         number, _, unit = value.strip().rpartition(" ") if isinstance(value, str) else ("", "", "")
         if unit not in OTHERS:
