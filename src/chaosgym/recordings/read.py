@@ -118,8 +118,6 @@ def read_recording(source: str | Path, *, sheet: str | None = None, column: str 
         raw, one = (raw, named(raw)) if isinstance(raw, Raw) else _part(raw, form.name, sheet, column)
     except DiagnosisError as error:
         raise DiagnosisError(f"{name} {error}") from error
-    except ImportError:
-        raise
     except Exception as error:  # whatever a library says of damaged bytes
         raise DiagnosisError(
             f"{name} can't be read as {form.name}: {(str(error).splitlines() or ['damaged'])[0][:120]}"

@@ -19,8 +19,8 @@ LONGEST_GAP, UNEVEN = 1.5, 0.2
 EPOCHS = {1e9: 1.0, 1e12: 1e-3, 1e15: 1e-6, 1e18: 1e-9}
 """Seconds in a unit of the clocks that count from 1970, by the smallest of their readings: those of September 2001."""
 
-AGREE = 0.02
-"""Relative deviation of two sampling rates that are the same."""
+AGREE, SLOW = 0.02, 0.1
+"""Relative deviation of two sampling rates that are the same, and the step [s] from which stamps need a unit."""
 
 
 class Sampling(NamedTuple):
@@ -132,21 +132,20 @@ def _size(recording: Recording, name: str, rate_hz: float | None) -> tuple[float
     Raises
     ------
     DiagnosisError
-        If they count in whole numbers, which may be those of any clock.
+        If they step so far that they may count parts of a second.
     """
     values = recording.columns[name]
-    step = float(values[-1] - values[0]) / max(1, len(values) - 1)
+    step, typical = float(values[-1] - values[0]) / max(1, len(values) - 1), float(np.median(np.diff(values)))
     if rate_hz is not None and step > 0.0:
         for unit in ("s", "ms", "us", "ns"):
             if abs(step * TIMES[unit] * rate_hz - 1.0) < AGREE:
                 return TIMES[unit], f"{unit}, by the stated rate of {rate_hz:.6g} Hz"
     for least, size in EPOCHS.items():
-        if least <= values[0] and values[-1] < 3.0 * least:
+        if least <= values[0] and values[-1] < 3.0 * least and typical * size < 2.0:
             return size, f"{duration(size).removeprefix('1 ')} since 1970"
-    typical = float(np.median(np.diff(values)))
-    if typical >= 1.0 and np.all(values == np.round(values)):
+    if typical >= SLOW * (1.0 - 1e-9):
         raise DiagnosisError(
-            f"{recording.source}: column {name!r} counts in steps of {typical:.6g} without a unit; name it "
+            f"{recording.source}: column {name!r} rises in steps of {typical:.6g} without a unit; name it "
             f"'{name} [ms]' or '{name} [s]', or use --rate-hz, {1e3 / typical:.6g} if these are milliseconds"
         )
     return 1.0, "no unit, taken as s"

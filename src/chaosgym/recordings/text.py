@@ -96,7 +96,7 @@ def read_text(data: bytes) -> Raw:
     form += ", decimal comma" if comma else ""
     form += f", {len(kept) - end} lines from line {kept[end][0]} on left out" if end < len(kept) else ""
     if again:
-        form += f", a heading repeated amid the data left out ({len(again)} lines, the first is {again[0]})"
+        form += f", a heading repeated amid the data left out, first in line {again[0]}"
     return Raw(form, columns, heading.stated, lines, bool(heading.titles))
 
 
