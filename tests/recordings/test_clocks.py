@@ -107,7 +107,7 @@ def test_a_signal_may_end_in_time_and_a_speed_beside_it_is_offered(tmp_path):
     savemat(path, {"X097_DE_time": FORCE[:, None] - 25.0, "X097RPM": np.array([[1796]])})
     signal, cut = peaks_of_series(read_recording(path), rate_hz=12_000.0)
     assert signal.name == "X097_DE_time"
-    assert cut.notes[-1] == "the file states X097RPM = 1796; if that is the speed, use --rpm 1796"
+    assert cut.notes[-1] == "the file states X097RPM = 1796; if that is the speed, state it"
 
 
 def test_channels_of_their_own_rate_keep_it(tmp_path):

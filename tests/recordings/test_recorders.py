@@ -14,6 +14,7 @@ from chaosgym.errors import DiagnosisError
 from chaosgym.recordings.columns import choose_force
 from chaosgym.recordings.read import read_recording
 from chaosgym.recordings.sampling import sampling
+from tests.cli.run import run
 
 RATE = 2000.0
 FORCE = 20.0 + 15.0 * np.sin(0.7 * np.arange(60))
@@ -189,6 +190,15 @@ def test_the_sheet_with_the_data_is_taken_and_named(tmp_path):
         read_recording(path, sheet="Three")
     with pytest.raises(DiagnosisError, match=r"rig.xlsx has no column 'none'"):
         choose_force(read_recording(path, column="none"), "none")
+
+
+def test_a_sheet_is_named_by_an_option(tmp_path):
+    """The one that is named is judged, and said in the line of what was read."""
+    path = tmp_path / "rig.xlsx"
+    rows = [("peak [N]",), *((40.0 + place % 2,) for place in range(200))]
+    workbook(path, One=[("peak [N]",), *rows[1:100]], Two=rows)
+    code, out, _ = run("diagnose", "--peaks", path, "--sheet", "Two", "--sensor-error", "0.1 N")
+    assert (code, "Excel, sheet 'Two' of 'One', 'Two', column 'peak' (N), 200 readings" in out) == (0, True)
 
 
 def test_a_sheet_belongs_to_a_workbook(tmp_path):

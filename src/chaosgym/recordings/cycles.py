@@ -343,6 +343,5 @@ def peaks_of_series(
     cut = cycle_peaks(signal.values, instants, period, turns)
     if cut.condition and recording.speeds:
         listed = ", ".join(f"{key} = {speed:g}" for key, speed in recording.speeds.items())
-        first = next(iter(recording.speeds.values()))
-        cut = replace(cut, notes=(*cut.notes, f"the file states {listed}; if that is the speed, use --rpm {first:g}"))
+        cut = replace(cut, notes=(*cut.notes, f"the file states {listed}; if that is the speed, state it"))
     return signal, cut
