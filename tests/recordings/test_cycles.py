@@ -121,3 +121,10 @@ def test_the_cycle_is_stated_once():
         cycle_period(1200.0, 20.0, None)
     with pytest.raises(DiagnosisError, match="above 0"):
         cycle_period(0.0, None, None)
+
+
+def test_a_reading_that_alternates_with_every_sample_is_too_coarse(tmp_path):
+    """Its line is at half the sampling rate: two samples a cycle."""
+    np.save(tmp_path / "n.npy", np.tile([0.0, 1.0], 200))
+    with pytest.raises(DiagnosisError, match=r"a cycle of 2 ms holds 2.0 samples; allowed: at least 8"):
+        peaks_of_series(read_recording(tmp_path / "n.npy"), rate_hz=1000.0)

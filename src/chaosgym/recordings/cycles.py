@@ -15,6 +15,7 @@ from chaosgym.recordings.columns import Signal, choose_force, named_column
 from chaosgym.recordings.read import Recording
 from chaosgym.recordings.sampling import Sampling, sampling
 from chaosgym.recordings.tachometer import Turns, turns_of
+from chaosgym.units import duration
 
 FEWEST_SAMPLES = 8
 """Samples that a cycle must have."""
@@ -94,6 +95,8 @@ def estimated_period(value: Array, step: float) -> float:
         near = slice(max(12, place - 4), place + 5)
         if place > 16 and power[near].max() > 0.05 * power[peak]:
             best = near.start + int(np.argmax(power[near]))
+    if best == len(power) - 1:  # the reading alternates with every sample
+        return 2.0 * step
     left, middle, right = (math.log(max(float(power[best + k]), 1e-300)) for k in (-1, 0, 1))
     shift = 0.5 * (left - right) / (left - 2.0 * middle + right) if left - 2.0 * middle + right else 0.0
     return 4 * size * step / (best + shift)
@@ -139,14 +142,14 @@ def cycle_peaks(
     if turns is not None:
         starts = turns.starts
         cycle = float(np.mean(np.diff(starts)))
-        notes.append(f"cycle from the tachometer: {cycle:.6g} s on average, {len(starts) - 1} cycles")
+        notes.append(f"cycle from the tachometer: {duration(cycle, 6)} on average, {len(starts) - 1} cycles")
         notes += filter(None, [turns.told])
     elif period is None:
         cycle = estimated_period(value, instants.step)
-        condition = f"if the cycle is {1e3 * cycle:.4g} ms"
+        condition = f"if the cycle is {duration(cycle)}"
         notes.append(
-            f"cycle estimated from the spectrum: {cycle:.6g} s ({1.0 / cycle:.5g} Hz); state it (--hz, --rpm) if that "
-            "is not the speed"
+            f"cycle estimated from the spectrum: {duration(cycle, 6)} ({1.0 / cycle:.5g} Hz); state it (--hz, --rpm) "
+            "if that is not the speed"
         )
     else:
         cycle = period
@@ -166,7 +169,7 @@ def cycle_peaks(
     if dropped:
         notes.append(f"{dropped} cycles left out: samples are missing")
     if len(peaks) == 0:
-        raise DiagnosisError(f"the series holds no whole cycle of {cycle:g} s")
+        raise DiagnosisError(f"the series holds no whole cycle of {duration(cycle)}")
     return CyclePeaks(peaks, kept, spread, cycle, tuple(notes), condition)
 
 
@@ -181,9 +184,11 @@ def _check_cycle(cycle: float, instants: Sampling) -> None:
     lasts = float(instants.time[-1] - instants.time[0]) + instants.step
     if cycle < FEWEST_SAMPLES * instants.step:
         held = cycle / instants.step
-        raise DiagnosisError(f"a cycle of {cycle:g} s holds {held:.1f} samples; allowed: at least {FEWEST_SAMPLES}")
+        raise DiagnosisError(
+            f"a cycle of {duration(cycle)} holds {held:.1f} samples; allowed: at least {FEWEST_SAMPLES}"
+        )
     if cycle > lasts * (1.0 + 1e-9):
-        raise DiagnosisError(f"the series lasts {lasts:g} s, less than one cycle of {cycle:g} s")
+        raise DiagnosisError(f"the series lasts {duration(lasts)}, less than one cycle of {duration(cycle)}")
 
 
 def _shifted_to_quiet(value: Array, time: Array, starts: Array) -> Array:
@@ -276,10 +281,10 @@ def series_of(
         signal = choose_force(replace(recording, columns=rest), None, unit, scale)
     else:
         signal = choose_force(recording, column, unit, scale)
-    instants = sampling(recording, len(signal.values), rate_hz)
+    instants = sampling(recording, len(signal.values), rate_hz, signal.name)
     size = min(len(signal.values), len(instants.time))
     instants = instants._replace(time=instants.time[:size])
-    signal = signal._replace(values=signal.values[:size])
+    signal = signal._replace(values=signal.values[:size], described=f"{signal.described}; {instants}")
     if tachometer is None:
         return signal, instants, None
     if tachometer == signal.name:
@@ -335,4 +340,8 @@ def peaks_of_series(
         pulses_per_revolution=pulses_per_revolution,
         scale=scale,
     )
-    return signal, cycle_peaks(signal.values, instants, period, turns)
+    cut = cycle_peaks(signal.values, instants, period, turns)
+    if cut.condition and recording.speeds:
+        listed = ", ".join(f"{key} = {speed:g}" for key, speed in recording.speeds.items())
+        cut = replace(cut, notes=(*cut.notes, f"the file states {listed}; if that is the speed, state it"))
+    return signal, cut
