@@ -32,7 +32,8 @@ def contradictions(answer: "DesignStudy") -> list[str]:
         said.append(f"Type I, with {largest:.4g} N in the tolerances and {found.response.largest_peak:.4g} N nominally")
     if found.type in ("I", "II") and found.evaluation.largest_force < largest * (1.0 - 1e-9):
         said.append(f"largest peak {found.evaluation.largest_force:.4g} N, with {largest:.4g} N in the tolerances")
-    if (found.verdict == "meets") != ("undetermined" not in found.types and all(check.met for check in found.checks)):
+    met = bool(found.checks) and all(check.met for check in found.checks)
+    if (found.verdict == "meets") != ("undetermined" not in found.types and met):
         said.append(f"the verdict {found.verdict!r} does not follow from type and checks")
     said += _of_parts(found)
     best = None if answer.improvement is None else answer.improvement.best
@@ -57,6 +58,8 @@ def contradictions(answer: "DesignStudy") -> list[str]:
 def _of_parts(found: Assessment) -> list[str]:
     """Criteria of the flexible part and of wear that are not what was found of these."""
     lives = dict[str, float]()
+    if found.criteria.life is None:
+        return []
     if found.bending is not None:
         lives["bending life"] = min(found.bending.lives) / found.bending.bending.uncertainty
     if found.wear is not None:

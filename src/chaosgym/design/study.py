@@ -16,7 +16,7 @@ from chaosgym.design.improve import Improvement, Trial, improve
 from chaosgym.design.methodology import Assessment, Check
 from chaosgym.design.peak_impacts import PeakImpactDiagram, filling_cycles, peak_impacts, worn_side
 from chaosgym.design.surroundings import in_tolerance, map_around, suggested
-from chaosgym.design.told import hours_told
+from chaosgym.design.told import hours_told, life_told
 from chaosgym.design.trends import (
     DIAGRAM_CYCLES,
     HISTORY_SAMPLES,
@@ -51,7 +51,7 @@ class DesignStudy:
     assessment
         Of the machine as it is.
     improvement
-        Ranked changes; None if the machine meets its criteria as it is.
+        Ranked changes; None if the machine meets its criteria as it is. Where nothing is judged they are compared.
     map
         Types around the nominal speed and clearance; None where these do not vary or leave their range.
     life_over_speed
@@ -94,15 +94,18 @@ class DesignStudy:
         """Return lines for people."""
         found, best = self.assessment, self.improvement.best if self.improvement is not None else None
         lines = [
-            f"{found.machine.name}: {found.verdict}",
+            f"{found.machine.name}: {found.judged}",
             f"  Type {found.type}: {found.response.reason}; {found.evaluation.method.partition(': ')[2]}",
             f"  {found.series.told}",
             *(f"  {line}" for line in self.combination.told),
             *(f"  {line}" for line in self.duty_told),
             *(f"  {check.name:19s} {_told(check, found.cycle_period)}" for check in found.checks),
+            *(f"  {line}" for line in self.life_told),
+            *(f"  {line}" for line in found.not_judged),
             f"  largest peak        {found.evaluation.largest_force:.1f} N, equivalent {found.evaluation.force:.1f} N",
-            f"  load rating         {found.evaluation.required_load_rating:.0f} N needed for the life",
         ]
+        if found.criteria.life is not None:
+            lines.append(f"  load rating         {found.evaluation.required_load_rating:.0f} N needed for the life")
         lines += [f"  {line}" for line in self.bending_told]
         lines += [f"  {line}" for line in ([] if found.wear is None else found.wear.told)]
         lines += [f"  {line}" for line in self.drive_told]
@@ -114,9 +117,21 @@ class DesignStudy:
             lines += [f"  dearer, and better: {one.told}, cost {one.cost:.2f}, {_better(one)}" for one in self.dearer]
         elif self.improvement is not None:
             lines.append(f"  {self.improvement.told}")
+            if not found.checks:
+                lines += [f"  next: {one.compared}" for one in self.improvement.suggestions[1:3]]
         if self.life_over_speed is None:
             lines.append(f"  no life against speed: {NO_TREND}")
         return lines
+
+    @property
+    def life_told(self) -> list[str]:
+        """Life by a load rating where no life is required, for people; none otherwise."""
+        found = self.assessment
+        if found.criteria.load_rating is None or found.criteria.life is not None:
+            return []
+        lasts = found.evaluation.life_interval.low
+        hours = hours_told(hours_of(lasts, found.cycle_period))
+        return [f"life                {hours} in operation ({life_told(lasts)} million cycles), of none required"]
 
     @property
     def duty_told(self) -> list[str]:
@@ -126,7 +141,11 @@ class DesignStudy:
         for part, damage in zip(parts, damage_shares(parts), strict=True):
             found = part.assessment
             hours = hours_of(found.evaluation.life_interval.low, found.machine.cycle_period)
-            alone = f"{hours_told(hours)} if it ran at this speed alone" if np.isfinite(hours) else "no contact"
+            if np.isfinite(hours):
+                alone = f"{hours_told(hours)} if it ran at this speed alone"
+            else:
+                force = found.evaluation.force
+                alone = f"equivalent force {force:.1f} N" if force else "no contact"
             speed = quantity_of(found.machine, found.machine.speed_field)
             lines.append(
                 f"{part.share:.0%} of the time at {speed}: Type {found.type}, {alone}, {damage:.0%} of the damage"
@@ -177,7 +196,9 @@ class DesignStudy:
             "seed": self.seed,
             **self.assessment.as_dict(),
             "life_hours": _finite([hours_of(life, self.assessment.cycle_period) for life in lives]),
-            "required_life_hours": hours_of(self.assessment.criteria.life, self.assessment.cycle_period),
+            "required_life_hours": None
+            if self.assessment.criteria.life is None
+            else hours_of(self.assessment.criteria.life, self.assessment.cycle_period),
             "collective": [
                 {
                     "speed": part.speed,
@@ -238,8 +259,10 @@ def _told(check: Check, cycle_period: float) -> str:
 
 def _better(trial: Trial) -> str:
     """What a dearer change gives."""
-    life = f"{trial.life:.3g} required lives" if np.isfinite(trial.life) else "no contact"
-    return f"{life}, {trial.robustness:.0%} of the machines meet"
+    unit = "required" if trial.judges_life else "present"
+    life = f"{trial.life:.3g} {unit} lives" if np.isfinite(trial.life) else "no contact"
+    does = "meet" if trial.assessment.criteria.judges_machines else "are periodic"
+    return f"{life}, {trial.robustness:.0%} of the machines {does}"
 
 
 def _finite(values: Any) -> list[float | None]:
