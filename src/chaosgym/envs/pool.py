@@ -130,5 +130,5 @@ def pool_task() -> Task:
         deviation_weight=3.5,
         speed_ripple=0.002,
         sensor_error=0.0125,
-        load_rating=1.0,
+        reference_force=1.0,
     )
