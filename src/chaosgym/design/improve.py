@@ -24,6 +24,7 @@ from chaosgym.arrays import Array
 from chaosgym.design.bearing import Evaluation, evaluate
 from chaosgym.design.changes import allowed, between, change_cost, default_changes, differing, distinct, part_of
 from chaosgym.design.collective import assess_duty
+from chaosgym.design.fatigue import equivalent_force
 from chaosgym.design.methodology import SERIES_SIZE, Assessment, Check, enough
 from chaosgym.design.runs import deviating, sobol_shares, worse_side
 from chaosgym.design.told import listed
@@ -57,7 +58,9 @@ class Trial:
     cost: float
     assessment: Assessment
     relative_life: float = math.nan
-    """Life in operation over that of the machine as it is: by equivalent force, its exponent and the cycle's time."""
+    """Life in operation over that of the machine as it is: by ``force``, the exponent, and the cycle's time."""
+    force: float = math.nan
+    """Equivalent force over the machines built [N], whatever the type, so that changes compare like with like."""
 
     @property
     def meets(self) -> bool:
@@ -93,9 +96,8 @@ class Trial:
         """Type, force and life beside the machine as it is, for people."""
         found, lasts = self.assessment, self.relative_life
         life = f"life x{lasts:.3g} of the present one" if math.isfinite(lasts) else "no contact"
-        return (
-            f"{self.told}: Type {found.type}, equivalent {found.evaluation.force:.1f} N, {life}, cost {self.cost:.2f}"
-        )
+        force = f"equivalent {self.force:.1f} N over the machines built"
+        return f"{self.told}: Type {found.type}, {force}, {life}, cost {self.cost:.2f}"
 
     @property
     def told(self) -> str:
@@ -112,6 +114,7 @@ class Trial:
             "cost": self.cost,
             "type": self.assessment.type,
             "life_in_required_lives": self.life if self.judges_life and math.isfinite(self.life) else None,
+            "force_of_machines_N": self.force,
             "relative_life": self.relative_life if math.isfinite(self.relative_life) else None,
             "robustness": self.robustness,
             **{name: result[name] for name in kept},
@@ -253,7 +256,10 @@ def improve(
             )
         except (SimulationError, ParameterError, DesignError):
             return None
-        return Trial(dict(change), change_cost(machine, change, weights, force), result, _relative(assessment, result))
+        after = force_of_machines(result)
+        return Trial(
+            dict(change), change_cost(machine, change, weights, force), result, _lives(assessment, result, after), after
+        )
 
     stated = [
         {name: float(value)} for name, row in values.items() for value in row if value != getattr(machine, name, None)
@@ -284,9 +290,21 @@ def improve(
     return Improvement(tuple(sorted(done, key=_rank)), best, len(candidates))
 
 
-def _relative(present: Assessment, changed: Assessment) -> float:
-    """Life in operation of a changed machine in lives of the present one."""
-    before, after = present.evaluation.force, changed.evaluation.force
+def force_of_machines(found: Assessment) -> float:
+    """Equivalent force [N] over the machines built, each equally likely, and over the speeds of the duty."""
+    exponent, forces, rates = found.criteria.life_exponent, list[float](), list[float]()
+    for share, one in [(part.share, part.assessment) for part in found.collective] or [(1.0, found)]:
+        runs = (one.nominal, *one.series.runs)
+        forces.append(
+            equivalent_force([equivalent_force(run.worse_side(exponent), exponent) for run in runs], exponent)
+        )
+        rates.append(share / one.machine.cycle_period)
+    return equivalent_force(forces, exponent, np.array(rates) / sum(rates))
+
+
+def _lives(present: Assessment, changed: Assessment, after: float) -> float:
+    """Life in operation of a changed machine, with its force [N], in lives of the present one."""
+    before = force_of_machines(present)
     if after == 0.0:
         return math.inf if before else 1.0
     slower = changed.cycle_period / present.cycle_period
@@ -331,7 +349,7 @@ def _screened(
     """
     if not candidates:
         return []
-    present = assessment.evaluation.force or 1.0
+    present = force_of_machines(assessment) or 1.0
     region, criteria, exponent = assessment.region, assessment.criteria, assessment.criteria.life_exponent
     shares = sobol_shares(len(region), SCREENED_MACHINES, seed) if region else np.zeros((1, 0))
 

@@ -12,7 +12,7 @@ from chaosgym.design.combination import Combination, combination
 from chaosgym.design.contradictions import contradictions
 from chaosgym.design.fatigue import equivalent_force_of_history
 from chaosgym.design.guidelines import Guideline, guidelines
-from chaosgym.design.improve import Improvement, Trial, improve
+from chaosgym.design.improve import Improvement, Trial, force_of_machines, improve
 from chaosgym.design.methodology import Assessment, Check
 from chaosgym.design.peak_impacts import PeakImpactDiagram, filling_cycles, peak_impacts, worn_side
 from chaosgym.design.surroundings import in_tolerance, map_around, suggested
@@ -118,6 +118,7 @@ class DesignStudy:
         elif self.improvement is not None:
             lines.append(f"  {self.improvement.told}")
             if not found.checks:
+                lines.append(f"  as it is: equivalent {force_of_machines(found):.1f} N over the machines built")
                 lines += [f"  next: {one.compared}" for one in self.improvement.suggestions[1:3]]
         if self.life_over_speed is None:
             lines.append(f"  no life against speed: {NO_TREND}")
