@@ -30,7 +30,7 @@ SETTLING, JUDGED, TOGETHER = 20, 20, 64
 """Cycles at a speed before forces count and while they do, and machines side by side."""
 
 FOLLOWING = 0.28
-"""Share of a life that a job of who follows the demand uses up, as on the beam."""
+"""Damage of a job of who follows the demand, as on the beam."""
 
 CONTACT, LEAST_GAIN = 0.9, 0.05
 
