@@ -93,7 +93,7 @@ def common(rows: list[str], known: dict[str, Any]) -> str:
         sensor=task.sensor_error,
         bouncing=task.bouncing_error,
         missed=task.missed_impacts,
-        life=task.life_share,
+        life=task.reference_damage,
         observations=_table(f"Num | Observation | {columns}", _observations(list(known.values()))),
         rewards=_table(f"Term | Value | w, {columns.replace('| ', '| w, ')}", weights),
         arguments=_table(f"Parameter | {columns} | Description", _arguments([env.task for env in known.values()])),

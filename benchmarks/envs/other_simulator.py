@@ -64,7 +64,7 @@ class Rig:
     Attributes
     ----------
     irregular, damage
-        Share of irregular cycles of each step, and share of its life that the joint used up, by true forces.
+        Share of irregular cycles of each step, and damage of the joint, by true forces.
     """
 
     def __init__(self, kind: Any, machine: ImpactBeam, task: Task, seed: int) -> None:

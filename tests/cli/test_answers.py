@@ -68,7 +68,7 @@ QUICK = {
     "dataset-info": "map",
     "dataset-map": "map --out map2.png",
     "design": f'{PEAKS} --load-rating "500 N"; --template impact-beam',
-    "run-agent": f"{BEAM} --machine 13; {BEAM} --plant docs.examples.rig:Rig",
+    "run-agent": f"{BEAM} --machine 13 --load-rating 500; {BEAM} --machine 13; {BEAM} --plant docs.examples.rig:Rig",
     "info": "",
 }
 """Arguments of each command; several forms are divided by a semicolon, and run in this order in one folder."""

@@ -85,7 +85,7 @@ def test_the_best_felt_speed_is_one_that_was_felt():
         observations, *_ = envs.step(speeds[:, None])
     assert returned > 100
     following, best = (play(one, BEAM, MACHINES, objective="life") for one in (Follow(), BestFelt()))
-    assert best.life.mean() > 1.2 * following.life.mean()
+    assert following.damage.mean() > 1.2 * best.damage.mean()
 
 
 def test_looking_ahead_stays_within_the_range_of_the_task():

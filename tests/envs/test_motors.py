@@ -26,7 +26,7 @@ STALL, FULL, WHEEL = 60.0, 1500.0, 0.1
 MOTOR = f'[motor]\nstall_torque = "{STALL} N m"\nno_load_speed = "{FULL} rpm"\ninertia = "{WHEEL} kg m^2"\n'
 LOSSY = '[[spring]]\nbetween = ["ground.shaft", "piston.pin"]\nstiffness = "100 N/m"\nfree_length = "0.1 m"\n'
 RANGE = {"lowest_speed": 600.0, "highest_speed": 1500.0, "lowest_demand": 700.0, "highest_demand": 1350.0}
-EASY = {**RANGE, "drive": "motor", "load_rating": 1e5, "shortest_hold": 4, "longest_hold": 8}
+EASY = {**RANGE, "drive": "motor", "reference_force": 1e5, "shortest_hold": 4, "longest_hold": 8}
 
 
 @pytest.fixture(scope="module")
@@ -153,7 +153,7 @@ def test_a_motor_that_stalls_ends_the_job(motored):
 
 def test_what_controllers_set_makes_up_for_the_slip(motored):
     """Following the demand ends at the demand, more than 50 rpm below the set-point."""
-    keywords = {**RANGE, "drive": "motor", "load_rating": 1e5, "action": "speed"}
+    keywords = {**RANGE, "drive": "motor", "reference_force": 1e5, "action": "speed"}
     envs = gym.make_vec("chaosgym/Machine-v0", num_envs=1, machine=motored(), **keywords, steps=60)
     observation, _ = envs.reset(seed=1)
     policy, missed, slip = Follow(), [], []

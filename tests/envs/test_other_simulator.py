@@ -53,7 +53,7 @@ def test_a_job_is_that_of_the_test_in_another_simulator():
     assert ours == theirs
     np.testing.assert_array_equal(demand, same)
     np.testing.assert_allclose(felt, seen, rtol=0.02, atol=0.02)
-    for name in ("type_iii", "clearance", "largest_force", "job_life"):
+    for name in ("type_iii", "clearance", "largest_force", "job_hours"):
         assert other[name] == pytest.approx(info[name], rel=0.05), name
 
 

@@ -277,7 +277,7 @@ BAD = {
     "no such file": (
         [("frequencies = ", "# frequencies = "), ('# matrices = "model.npz"', 'matrices = "gone.npz"')], "gone.npz"),
     "no TOML": ([("[joint]", "[joint")], "is not valid TOML"),
-    "a number of no task": ([("# [job]", "[job]"), ("# load_rating", "lode_rating")], None),
+    "a number of no task": ([("# [job]", "[job]"), ("# reference_force", "referense_force")], None),
 }  # fmt: skip
 
 
@@ -287,7 +287,7 @@ def test_bad_files_end_in_one_line(machine_file, case):
     changes, message = BAD[case]
     path = machine_file(*changes)
     if message is None:
-        with pytest.raises(ParameterError, match="no number 'lode_rating'; did you mean load_rating"):
+        with pytest.raises(ParameterError, match="no number 'referense_force'; did you mean reference_force"):
             gym.make("chaosgym/Machine-v0", machine=str(path))
         return
     result = CliRunner().invoke(app, ["show", str(path)])

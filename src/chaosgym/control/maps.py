@@ -45,8 +45,8 @@ class Maps:
         return Maps(self.speeds, _smoothed(self.share), _smoothed(self.mean_peak))
 
     def damage(self, task: Task) -> Array:
-        """Share of its life that the joint loses in a step of a task at each speed, (n, s), by the mean peaks."""
-        return damage_in_a_million(self.mean_peak, task.load_rating) * (task.life_share / task.steps)
+        """Damage of the joint in a step of a task at each speed, (n, s), by the mean peaks."""
+        return damage_in_a_million(self.mean_peak, task.reference_force) * (task.reference_damage / task.steps)
 
     def nearest(self, speeds: Array) -> NDArray[np.int64]:
         """Places of the nearest speeds of the maps."""

@@ -64,7 +64,7 @@ class Jobs:
     demand : (N, steps + 1)
         Of every step of the job.
     damage : (N, sides)
-        Share of its life that each surface has used up.
+        Of each surface; 1 ends a job.
     told
         Names of the columns of a report that are the info of a step.
     force : (N,)

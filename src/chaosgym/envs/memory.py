@@ -97,7 +97,7 @@ class SpeedMemory:
         self._past = np.zeros((count, PAST, len(KEPT)))
         self._last = np.zeros((count, len(KEPT)))
         self._sum, self._weight = np.zeros((count, len(COMPARED))), np.zeros((count, 1))
-        force = max(task.sensor_error, 1e-3 * task.load_rating)
+        force = max(task.sensor_error, 1e-3 * task.reference_force)
         self._floor = np.array([force / 3.0, 0.5, 0.005])
         self._noise = force
 

@@ -76,7 +76,7 @@ def asked_of(task: Task) -> tuple[str, ...]:
 
 def observation_space(task: Task) -> Box:
     """Return the space of observations, (14,) and one more for each keyword of ``ASKED``, with finite bounds."""
-    span, force = task.highest_speed - task.lowest_speed, FORCE_RANGE * task.load_rating
+    span, force = task.highest_speed - task.lowest_speed, FORCE_RANGE * task.reference_force
     trim = span if task.action == "speed" else task.largest_trim
     slowest, fastest = task.lowest_speed, task.highest_speed
     if task.drive == "motor":

@@ -16,8 +16,8 @@ from matplotlib.figure import Figure
 from chaosgym.arrays import Array
 from chaosgym.branches.bifurcation_diagram import BifurcationDiagram
 from chaosgym.branches.bifurcation_map import BifurcationMap
+from chaosgym.design.design_study import DesignStudy
 from chaosgym.design.measured import MeasuredPeaks
-from chaosgym.design.study import DesignStudy
 from chaosgym.diagnosis.verdict import MachineDiagnosis
 from chaosgym.fit.overlay import Overlay
 from chaosgym.machines import Machine
@@ -258,7 +258,9 @@ def peaks_figure(measured: MeasuredPeaks) -> Figure:
         f"{value:,.0f}" if value >= 100.0 else f"{value:.3g}"
         for value in (found.life, found.life_interval.low, found.life_interval.high)
     )
-    figure.suptitle(f"Life {life} million cycles ({low} to {high})", **TITLE)
+    rated = measured.criteria.load_rating is not None
+    title = f"Life {life} million cycles ({low} to {high})" if rated else f"Equivalent force {found.force:.1f} N"
+    figure.suptitle(title, **TITLE)
     left.set_title("")
     return figure
 

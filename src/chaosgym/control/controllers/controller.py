@@ -90,5 +90,5 @@ def irregular(observations: Observations, task: Task, threshold: float, softness
     """
     if task.classifier == "on":
         return (observations[:, -1] > SURE).astype(float)
-    felt = irregularity(observations) / max(task.sensor_error, 1e-3 * task.load_rating)
+    felt = irregularity(observations) / max(task.sensor_error, 1e-3 * task.reference_force)
     return np.asarray(0.5 + 0.5 * np.tanh(0.5 * (felt - threshold) / softness))

@@ -179,7 +179,7 @@ class LearnedMap(Controller):
         answer, _ = self.network(self._felt.add(observations), None)
         share = 0.5 + 0.5 * np.tanh(0.5 * answer[:, : len(grid)].astype(float))
         peak = np.exp(answer[:, len(grid) :].astype(float).clip(-10.0, 20.0))
-        lost = damage_in_a_million(peak, task.load_rating) * task.life_share / task.steps
+        lost = damage_in_a_million(peak, task.reference_force) * task.reference_damage / task.steps
         demand = seen(observations, "demand")
         cost = self.cost(share, lost, demand, grid)
         cost[np.abs(grid - demand[:, None]) > task.largest_trim + 0.5 * task.trim_step] = np.inf

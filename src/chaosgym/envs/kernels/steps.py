@@ -27,8 +27,8 @@ TERMS = tuple(f"reward_{term}" for term in ("deviation", "type_iii", "damage", "
 
 MOTOR = ("set_point", "motor_torque", "motor_power")
 
-SO_FAR = tuple(f"job_{name}" for name in ("deviation", "type_iii", "largest_force", "equivalent_force", "life"))
-"""What the job has come to: means, largest force [N], the constant one that wears as much [N], and life [h]."""
+SO_FAR = tuple(f"job_{name}" for name in ("deviation", "type_iii", "largest_force", "equivalent_force", "hours"))
+"""What the job has come to: means, largest force [N], the constant one that wears as much [N], and time [h]."""
 
 REPORT = np.dtype(
     [(name, np.float64) for name in (*TERMS, "speed", "demand", "deviation", "type_iii", "cost", "irregularity")]
@@ -115,15 +115,15 @@ def rewards_of(task, deviation, type_iii, damage, time, failed, steps_left):
 def sum_up(task, job, force, damage, row):
     """Write ``SO_FAR`` of a ``job`` into its ``row``, by the ``damage`` of its joint; forces are shares of ``force``.
 
-    Life is the time over the damage, infinite without wear; under the equivalent force in every cycle it is the same.
-    That force is not a number where no force wears the joint, with a ``life_share`` of 0.
+    Under the equivalent force in every cycle the damage is the same; it is not a number where no force wears the joint,
+    with a ``reference_damage`` of 0.
     """
-    done, share = job["done"], task["life_share"]
+    done, share = job["done"], task["reference_damage"]
     row["job_deviation"], row["job_type_iii"] = job["off"] / done, job["irregular"] / done
     row["job_largest_force"] = job["largest_force"] * force
     steady = (damage * task["steps"] / done / share) ** (1.0 / LIFE_EXPONENT) if share > 0.0 else np.nan
-    row["job_equivalent_force"] = force * task["load_rating"] * steady
-    row["job_life"] = job["seconds"] / 3600.0 / damage if damage > 0.0 else np.inf
+    row["job_equivalent_force"] = force * task["reference_force"] * steady
+    row["job_hours"] = job["seconds"] / 3600.0
 
 
 @njit(cache=True, nogil=True)
