@@ -10,6 +10,7 @@ that ``docs/data/peaks.csv`` is undetermined.
 """
 
 import sys
+from functools import partial
 from pathlib import Path
 
 import numpy as np
@@ -43,4 +44,4 @@ def recordings(seed: int = 0) -> dict[str, str]:
 
 if __name__ == "__main__":
     for name, text in recordings().items():
-        write_atomically(Path(sys.argv[1], name), lambda file, text=text: file.write_text(text))
+        write_atomically(Path(sys.argv[1], name), partial(Path.write_text, data=text))

@@ -23,6 +23,9 @@ from chaosgym.diagnosis import ResponseMap
 from chaosgym.machines.parameters import quantity_of, with_settings
 from chaosgym.version import __version__
 
+NO_TREND = "the gap closes at no speed of the usual range"
+"""Why life is not drawn against speed."""
+
 
 @dataclass(frozen=True)
 class DesignStudy:
