@@ -41,6 +41,11 @@ def recordings(seed: int = 0) -> dict[str, str]:
     }
 
 
+def write(path: Path, text: str) -> None:
+    """Write a file whole, or not at all."""
+    write_atomically(path, lambda unfinished: unfinished.write_text(text))
+
+
 if __name__ == "__main__":
-    for name, text in recordings().items():
-        write_atomically(Path(sys.argv[1], name), lambda file, text=text: file.write_text(text))
+    for name, recorded in recordings().items():
+        write(Path(sys.argv[1], name), recorded)
