@@ -10,7 +10,6 @@ that ``docs/data/peaks.csv`` is undetermined.
 """
 
 import sys
-from functools import partial
 from pathlib import Path
 
 import numpy as np
@@ -42,6 +41,11 @@ def recordings(seed: int = 0) -> dict[str, str]:
     }
 
 
+def write(path: Path, text: str) -> None:
+    """Write a file whole, or not at all."""
+    write_atomically(path, lambda unfinished: unfinished.write_text(text))
+
+
 if __name__ == "__main__":
-    for name, text in recordings().items():
-        write_atomically(Path(sys.argv[1], name), partial(Path.write_text, data=text))
+    for name, recorded in recordings().items():
+        write(Path(sys.argv[1], name), recorded)
