@@ -22,6 +22,9 @@ OTHER = re.compile(
 SPEED = re.compile(r"hz|freq\w*|frequenz|rpm|speed|drehzahl", re.IGNORECASE)
 """Words in the name of a column that holds the speed of each reading."""
 
+FIRST = 1000
+"""Readings that tell of most columns that they are no clock."""
+
 MOST_SHOWN = 12
 """Columns that a message names."""
 
@@ -43,12 +46,15 @@ class Signal(NamedTuple):
 
 def is_counter(values: Array) -> bool:
     """Whether values rise in equal steps, as a counter or an even time stamp does."""
-    steps = np.diff(values)
-    return len(values) > 4 and bool(steps[0] > 0.0 and np.allclose(steps, steps[0], rtol=1e-6, atol=0.0))
+    steps = np.diff(values[:FIRST])
+    even = len(values) > 4 and bool(steps[0] > 0.0 and np.allclose(steps, steps[0], rtol=1e-6, atol=0.0))
+    return even and (len(values) <= FIRST or bool(np.allclose(np.diff(values), steps[0], rtol=1e-6, atol=0.0)))
 
 
 def is_clock(values: Array) -> bool:
     """Whether values never fall and rise on and on, as rounded time stamps do."""
+    if np.any(np.diff(values[:FIRST]) < 0.0):
+        return False
     steps = np.diff(values)
     steady = len(values) > 7 and bool(np.all(steps >= 0.0) and steps.mean() > 0.0)
     return is_counter(values) or (steady and float(np.max(steps)) < 20.0 * float(steps.mean()))
@@ -72,7 +78,7 @@ def force_names(recording: Recording) -> list[str]:
 def _speaks_against(recording: Recording, name: str) -> str:
     """Why a column is no force; empty if it may be one."""
     values, unit = recording.columns[name], recording.units.get(name, "")
-    finite = values[np.isfinite(values)]
+    finite = _finite(values)
     if unit and unit not in FORCES:
         return f"is in {unit}"
     words = [word for word in re.split(r"[\W_\d]+", name) if word] if recording.named else []
@@ -179,7 +185,8 @@ def choose_speed(recording: Recording, column: str | None = None) -> Signal:
     if name in recording.problems:
         raise DiagnosisError(f"{recording.source}, {recording.problems[name]}")
     unit = recording.units.get(name, "")
-    return Signal(recording.columns[name], name, f"column {name!r}{f' ({unit})' if unit else ''} is the speed", unit)
+    described = f"column {name!r}{f' ({unit})' if unit else ''} is the speed"
+    return Signal(recording.columns[name].astype(float), name, described, unit)
 
 
 def forces(
@@ -223,7 +230,7 @@ def _force(recording: Recording, name: str, unit: str | None, scale: str | None)
         raise DiagnosisError(
             f"{recording.source}: column {name!r} is in {written}, no unit that is known; {told}: {listed}"
         )
-    if is_counter(values[np.isfinite(values)]):
+    if is_counter(_finite(values)):
         raise DiagnosisError(f"{recording.source}: column {name!r} rises in equal steps and can't be a force")
     factor, target = FORCES.get(written or "N", 1.0), "N" if (written or "N") in FORCES else written
     shown = f"{written}" if written else "taken as N"
@@ -233,7 +240,13 @@ def _force(recording: Recording, name: str, unit: str | None, scale: str | None)
     described = f"{recording.source}: {recording.form}, column {name!r} ({shown}), {len(values)} readings"
     if missing := int(np.count_nonzero(~np.isfinite(values))):
         described += f", {missing} of them missing, the first in {recording.where(int(np.argmin(np.isfinite(values))))}"
-    return Signal(values * factor, name, described, target)
+    return Signal(values if factor == 1.0 else np.multiply(values, factor, dtype=float), name, described, target)
+
+
+def _finite(values: Array) -> Array:
+    """Readings without those that are missing."""
+    there = np.isfinite(values)
+    return values if there.all() else values[there]
 
 
 def calibration(scale: str, written: str) -> tuple[float, str]:
@@ -283,7 +296,7 @@ def check_peaks(signal: Signal, recording: Recording) -> Array:
             f"{recording.source}, {recording.where(int(low[0]))}: {signal.values[low[0]]:g} N is a negative force; "
             "allowed: 0 N and more, one peak a cycle"
         )
-    return signal.values[np.isfinite(signal.values)]
+    return _finite(signal.values).astype(float)
 
 
 def _first(texts: list[str], between: str) -> str:

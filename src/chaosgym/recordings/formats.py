@@ -15,11 +15,11 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from chaosgym.errors import DiagnosisError
-from chaosgym.recordings.raw import Parts, Raw
+from chaosgym.recordings.raw import Data, Parts, Raw, stream
 from chaosgym.recordings.text import read_text
 
 
-def parquet(data: bytes) -> Raw:
+def parquet(data: Data) -> Raw:
     """Columns of a table; properties of a field, such as its unit, are stated."""
     import pyarrow.parquet as pq
 
@@ -30,9 +30,9 @@ def parquet(data: bytes) -> Raw:
     return raw
 
 
-def numpy(data: bytes) -> Raw:
+def numpy(data: Data) -> Raw:
     """An array (n,) or (n, columns), or one of records with names."""
-    array = np.load(io.BytesIO(data), allow_pickle=False)
+    array = np.load(stream(data), allow_pickle=False)
     raw = Raw("NumPy", named=bool(array.dtype.names))
     for name in array.dtype.names or ():
         raw.add(name, array[name])
@@ -43,7 +43,7 @@ def numpy(data: bytes) -> Raw:
     return raw
 
 
-def universal(data: bytes) -> Raw:
+def universal(data: Data) -> Raw:
     """Data sets 58 of a universal file."""
     pyuff, raw = needed("pyuff", "a universal file", "uff"), Raw("UFF")
     with tempfile.TemporaryDirectory() as folder:
@@ -58,7 +58,7 @@ def universal(data: bytes) -> Raw:
     return raw
 
 
-def tdms(data: bytes) -> Raw:
+def tdms(data: Data) -> Raw:
     """Channels of a file of LabVIEW or DIAdem."""
     file, raw = needed("nptdms", "a TDMS file").TdmsFile.read(io.BytesIO(data)), Raw("TDMS")
     for group in file.groups():
@@ -67,7 +67,7 @@ def tdms(data: bytes) -> Raw:
     return raw
 
 
-def mdf(data: bytes) -> Raw:
+def mdf(data: Data) -> Raw:
     """Channels of a measurement file of the automotive industry, version 3 or 4; their common time is ``time``."""
     raw, times = Raw("MDF"), dict[int, Any]()
     with needed("asammdf", "an MDF file").MDF(io.BytesIO(data)) as file:
@@ -81,7 +81,7 @@ def mdf(data: bytes) -> Raw:
     return raw
 
 
-def hdf(data: bytes) -> Raw:
+def hdf(data: Data) -> Raw:
     """Data sets of an HDF5 file, that of MATLAB 7.3 included."""
     form, what = ("MATLAB 7.3", "a MATLAB file of version 7.3") if data[:6] == b"MATLAB" else ("HDF5", "an HDF5 file")
     h5py, raw = needed("h5py", what), Raw(form)
@@ -103,7 +103,7 @@ def hdf(data: bytes) -> Raw:
     return raw
 
 
-def matlab(data: bytes) -> Raw:
+def matlab(data: Data) -> Raw:
     """Variables of a MATLAB file, fields of structures included; a text beside them in a structure is a property."""
     from scipy.io import loadmat
 
@@ -134,7 +134,7 @@ def _is_text(value: Any) -> bool:
     return isinstance(value, np.ndarray) and value.dtype.kind == "U" and value.size == 1
 
 
-def excel(data: bytes) -> Parts:
+def excel(data: Data) -> Parts:
     """Sheets of a workbook."""
     book = needed("openpyxl", "an Excel workbook").load_workbook(io.BytesIO(data), read_only=True, data_only=True)
 
@@ -149,7 +149,7 @@ def _cell(value: Any) -> str:
     return "" if value is None else repr(value) if isinstance(value, float) else str(value).replace("\t", " ")
 
 
-def wav(data: bytes) -> Raw:
+def wav(data: Data) -> Raw:
     """Channels of a WAV file; whole numbers as shares of the full scale."""
     from scipy.io import wavfile
 
@@ -157,7 +157,7 @@ def wav(data: bytes) -> Raw:
     return _sound(samples, float(rate), "WAV")
 
 
-def flac(data: bytes) -> Raw:
+def flac(data: Data) -> Raw:
     """Channels of a FLAC file, as shares of the full scale."""
     samples, rate = needed("soundfile", "a FLAC file").read(io.BytesIO(data), dtype="int32")
     return _sound(samples, float(rate), "FLAC")
@@ -175,7 +175,7 @@ class Format(NamedTuple):
 
     name: str
     first: bytes
-    read: Callable[[bytes], Raw | Parts]
+    read: Callable[[Data], Raw | Parts]
 
 
 FORMATS = (
@@ -195,7 +195,7 @@ FORMATS = (
 """Formats in the order in which they are tried; what is none of the first is text."""
 
 
-def format_of(data: bytes) -> Format:
+def format_of(data: Data) -> Format:
     """Format of the bytes."""
     return next(each for each in FORMATS if re.match(each.first, data))
 

@@ -1,5 +1,7 @@
 """What a reader of a format returns: columns as the file holds them, and what the file says of them, as written."""
 
+import io
+import mmap
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 from typing import Any
@@ -8,13 +10,25 @@ import numpy as np
 
 from chaosgym.arrays import Array
 
+Data = bytes | mmap.mmap
+"""Bytes of a file, which a large one lends from the disk."""
+
+
+def stream(data: Data) -> Any:
+    """The bytes as an open file, without a copy of what is mapped."""
+    if isinstance(data, bytes):
+        return io.BytesIO(data)
+    data.seek(0)
+    return data
+
 
 @dataclass(frozen=True)
 class Column:
-    """Readings (n,) under a title as written; ``values`` is None where they are text, of which ``problem`` tells.
+    """Readings (n,) under a title as written, in single precision where the file has them so.
 
-    ``stated`` holds properties by name: ``{"unit_string": "kN", "wf_increment": 0.0005}``. ``group`` is the folder
-    in the file, ``place`` the number of a column of an array (n, columns).
+    ``values`` is None where they are text, of which ``problem`` tells. ``stated`` holds properties by name, such as
+    ``{"unit_string": "kN", "wf_increment": 0.0005}``. ``group`` is the folder in the file, ``place`` the number of a
+    column of an array (n, columns).
     """
 
     title: str
@@ -55,7 +69,7 @@ class Raw:
             table, stated = (table - start) / np.timedelta64(1, "s"), {**stated, "unit": "s"}
         if table.dtype.kind not in "fiub" or table.ndim not in (1, 2):
             return
-        table = np.atleast_2d(table.astype(float))
+        table = np.atleast_2d(table if table.dtype in (np.float32, np.float64) else table.astype(float))
         table = table.T if table.shape[0] < table.shape[1] else table
         several = table.shape[1] > 1 or not self.named
         for place, column in enumerate(table.T, start=1):

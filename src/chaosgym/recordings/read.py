@@ -6,6 +6,7 @@ CSV with any common delimiter, decimal comma, UTF-8 or UTF-16, comments and a he
 """
 
 import hashlib
+import mmap
 import os
 import select
 import stat
@@ -21,7 +22,7 @@ from chaosgym.errors import DiagnosisError
 from chaosgym.recordings.formats import format_of
 from chaosgym.recordings.naming import Named, named
 from chaosgym.recordings.quantities import split_unit
-from chaosgym.recordings.raw import Parts, Raw
+from chaosgym.recordings.raw import Data, Parts, Raw
 
 
 @dataclass(frozen=True)
@@ -176,8 +177,8 @@ PATIENCE = 2.0
 """Time [s] in which a named pipe must have something to read."""
 
 
-def _bytes_of(path: Path) -> bytes:
-    """Bytes of a file or a named pipe.
+def _bytes_of(path: Path) -> Data:
+    """Bytes of a file, mapped into memory, or of a named pipe.
 
     Raises
     ------
@@ -194,7 +195,10 @@ def _bytes_of(path: Path) -> bytes:
             f"{path} holds {told.st_size / 2**30:.1f} GiB; allowed: up to 1 GiB; cut it, or one peak a cycle"
         )
     if not stat.S_ISFIFO(told.st_mode):
-        return path.read_bytes()
+        if not told.st_size:
+            return path.read_bytes()
+        with open(path, "rb") as file:
+            return mmap.mmap(file.fileno(), 0, access=mmap.ACCESS_READ)
     with open(os.open(path, os.O_RDONLY | os.O_NONBLOCK), "rb") as pipe:
         if not select.select([pipe], [], [], PATIENCE)[0]:
             raise DiagnosisError(f"{path} is a pipe into which nothing was written for {PATIENCE:g} s")

@@ -23,16 +23,58 @@ AGREE, SLOW = 0.02, 0.1
 """Relative deviation of two sampling rates that are the same, and the step [s] from which stamps need a unit."""
 
 
+class Even(NamedTuple):
+    """Instants [s] in equal steps: the first one, the step, and how many there are."""
+
+    first: float
+    step: float
+    size: int
+
+
 class Sampling(NamedTuple):
     """Instants [s] of the samples, the step between them, gaps in words, and where the step comes from."""
 
-    time: Array
+    instants: Array | Even
     step: float
     gaps: tuple[str, ...]
     origin: str = ""
 
     def __str__(self) -> str:
-        return f"{duration(self.step * len(self.time))} at {1.0 / self.step:.6g} Hz {self.origin}".rstrip()
+        return f"{duration(self.step * self.size)} at {1.0 / self.step:.6g} Hz {self.origin}".rstrip()
+
+    @property
+    def size(self) -> int:
+        """Number of samples."""
+        return self.instants.size
+
+    @property
+    def time(self) -> Array:
+        """Instants [s], (n,)."""
+        return self.part(0, self.size)
+
+    def part(self, first: int, last: int) -> Array:
+        """Instants [s] of the samples from one place to before another."""
+        if isinstance(self.instants, Even):
+            return np.asarray(self.instants.first + self.step * np.arange(first, min(last, self.size)))
+        return self.instants[first:last]
+
+    def at(self, place: int) -> float:
+        """Instant [s] of one sample; a negative place counts from the last one."""
+        place %= self.size
+        return float(self.part(place, place + 1)[0])
+
+    def places(self, instants: Array) -> list[int]:
+        """Place of the first sample at or after each instant."""
+        if not isinstance(self.instants, Even):
+            return np.searchsorted(self.instants, instants).tolist()  # type: ignore[no-any-return]
+        places = np.ceil((instants - self.instants.first) / self.step)
+        return np.clip(places, 0, self.size).astype(int).tolist()  # type: ignore[no-any-return]
+
+    def shortened(self, size: int) -> "Sampling":
+        """The first samples."""
+        if isinstance(self.instants, Even):
+            return self._replace(instants=self.instants._replace(size=min(size, self.size)))
+        return self._replace(instants=self.instants[:size])
 
 
 def sampling(recording: Recording, size: int, rate_hz: float | None = None, column: str | None = None) -> Sampling:
@@ -77,7 +119,7 @@ def sampling(recording: Recording, size: int, rate_hz: float | None = None, colu
 def _at(rate: float, size: int, origin: str) -> Sampling:
     if not (math.isfinite(rate) and rate > 0.0):
         raise DiagnosisError(f"rate = {rate:g} Hz is out of range; allowed: above 0")
-    return Sampling(np.arange(size) / rate, 1.0 / rate, (), origin)
+    return Sampling(Even(0.0, 1.0 / rate, size), 1.0 / rate, (), origin)
 
 
 def choose_time(recording: Recording, *, told: bool = False, rate_hz: float | None = None) -> Signal | None:
@@ -97,7 +139,7 @@ def choose_time(recording: Recording, *, told: bool = False, rate_hz: float | No
     if name in recording.problems or name in recording.doubts:
         reason = recording.problems.get(name) or f"column {name!r} {recording.doubts[name]}"
         raise DiagnosisError(f"{recording.source}, {reason}")
-    values, unit = recording.columns[name], recording.units.get(name, "")
+    values, unit = recording.columns[name].astype(float), recording.units.get(name, "")
     if unit and unit in TIMES:
         values, shown = values * TIMES[unit], f"column {name!r} [{unit}]"
     else:
@@ -134,7 +176,7 @@ def _size(recording: Recording, name: str, rate_hz: float | None) -> tuple[float
     DiagnosisError
         If they step so far that they may count parts of a second.
     """
-    values = recording.columns[name]
+    values = recording.columns[name].astype(float)
     step, typical = float(values[-1] - values[0]) / max(1, len(values) - 1), float(np.median(np.diff(values)))
     if rate_hz is not None and step > 0.0:
         for unit in ("s", "ms", "us", "ns"):
@@ -223,7 +265,7 @@ def _within_stamps(stamps: Array, changes: list[int], recording: Recording) -> S
         )
     first = float(stamps[changes[0]]) - step * changes[0]
     origin = f", whose stamps of {duration(float(np.median(spans)))} hold {np.median(counts):.6g} samples each"
-    return Sampling(np.asarray(first + step * np.arange(len(stamps))), step, (), origin)
+    return Sampling(Even(first, step, len(stamps)), step, (), origin)
 
 
 def _rounding(stamps: Array) -> float:

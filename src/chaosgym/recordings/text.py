@@ -16,7 +16,7 @@ from chaosgym.arrays import Array
 from chaosgym.errors import DiagnosisError
 from chaosgym.recordings.heading import Heading, read_heading
 from chaosgym.recordings.naming import MOST_MISSING
-from chaosgym.recordings.raw import Column, Raw
+from chaosgym.recordings.raw import Column, Data, Raw
 
 DELIMITERS = {"\t": "tabs", ";": "semicolons", "|": "bars", ",": "commas", " ": "blanks"}
 """Delimiters in the order in which they are tried."""
@@ -47,12 +47,12 @@ TORN = re.compile(r'\s*"\s*[+-]?[\d.,]')
 NUMBER = re.compile(r"[+-]?(\d+[.,]?\d*|[.,]\d+)([eE][+-]?\d+)?|[+-]?(nan|inf(inity)?)", re.IGNORECASE)
 
 
-def read_text(data: bytes) -> Raw:
+def read_text(data: Data) -> Raw:
     """Columns of a text with what stands above them.
 
     Data begin where all columns that the end of the file has hold numbers; what stands above names them.
     """
-    text = _decoded(data)
+    text = _decoded(bytes(data))
     if "\0" in text:
         raise DiagnosisError("is neither text nor a format that is known (CSV, Parquet, .npy, .mat, WAV, UFF)")
     written = [(number, line.rstrip("\r")) for number, line in enumerate(text.split("\n"), start=1)]
