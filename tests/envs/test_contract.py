@@ -9,6 +9,7 @@ import pytest
 from gymnasium.utils.env_checker import check_env
 
 from chaosgym.envs import ENVIRONMENTS
+from chaosgym.envs.kernels.steps import PLACE
 from chaosgym.envs.machine_env import MachineEnv
 from chaosgym.envs.observation import MEANINGS
 from chaosgym.envs.task import Status, Task, UnknownKeywordError
@@ -85,7 +86,7 @@ def test_the_trim_holds_moves_and_goes_back(name: str) -> None:
     for action in (5, 5, 5, 5, 5, 5, 5, 1, 0, 3, 2, 5):
         observation, _, _, _, info = env.step(action)
         speeds.append(info["speed"] - info["demand"])
-        assert abs(observation[2]) <= env.task.largest_trim
+        assert abs(observation[PLACE.trim]) <= env.task.largest_trim
     assert speeds[6:] == pytest.approx([0.0, -step, -step, -3 * step, -2 * step, 0.0])
 
 

@@ -8,7 +8,7 @@ from gymnasium.vector import AutoresetMode
 from chaosgym.control.controllers import Follow
 from chaosgym.control.rollout import play
 from chaosgym.design.fatigue import equivalent_force, rating_life
-from chaosgym.envs.kernels.steps import SO_FAR
+from chaosgym.envs.kernels.steps import PLACE, SO_FAR
 from chaosgym.envs.variants import HELD_OUT_SEED
 
 BEAM = "chaosgym/ImpactBeamTolerance-v1"
@@ -62,11 +62,11 @@ def test_a_comparison_tells_the_info_of_the_last_step():
     observation, _ = env.reset(seed=seed, options={"machine": 3})
     ended = False
     while not ended:
-        observation, _, ended, _, info = env.step(observation[1:2])
+        observation, _, ended, _, info = env.step(observation[[PLACE.demand]])
     told = (played.deviation, played.type_iii_share, played.largest_force, played.equivalent_force, played.hours)
     assert [info[name] for name in SO_FAR] == pytest.approx([values[0] for values in told], rel=1e-9)
     observation, _ = env.reset(seed=seed, options={"machine": 3})
-    info = env.step(observation[1:2])[-1]
+    info = env.step(observation[[PLACE.demand]])[-1]
     assert info["job_type_iii"] == info["type_iii"]
     assert info["job_largest_force"] == info["largest_force"]
 

@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 from tqdm import trange
 
 from chaosgym.arrays import Array
-from chaosgym.envs.observation import COMMANDED, FELT, OBSERVATION_NAMES
+from chaosgym.envs.observation import FELT
 from chaosgym.envs.pool import SHARE
 from chaosgym.envs.task import Status
 from chaosgym.envs.vector_env import native_envs
@@ -41,7 +41,7 @@ class Policy(Protocol):
         ...
 
     def __call__(self, observations: Any) -> Any:
-        """Return the actions of all jobs for their observations (n, 14)."""
+        """Return the actions of all jobs for their observations (n, entries)."""
         ...
 
 
@@ -187,7 +187,7 @@ def play(
     policy.start(envs)
     steps, count = envs.task.steps, len(given)
     kept = {name: np.full((steps, count), np.nan) for name in ("speed", "demand", "type_iii", "reward")}
-    felt = np.full((steps, count, len(FELT)), np.nan)
+    felt, reported = np.full((steps, count, len(FELT)), np.nan), [envs.task.places[name] for name in FELT]
     last = {name: np.zeros(count) for name in ("damage", "job_largest_force", "job_equivalent_force", "job_hours")}
     status = np.zeros(count, np.int64)
     runs = np.ones(count, np.bool_)
@@ -196,7 +196,7 @@ def play(
         kept["reward"][step, runs] = rewards[runs]
         for name in ("speed", "demand", "type_iii"):
             kept[name][step, runs] = info[name][runs]
-        felt[step, runs] = observations[runs, len(COMMANDED) : len(OBSERVATION_NAMES)]
+        felt[step, runs] = observations[runs][:, reported]
         status[runs] = info["status"][runs]
         for name, values in last.items():
             values[runs] = info[name][runs]

@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 
 from chaosgym.arrays import Array
 from chaosgym.envs.jobs import Segment
-from chaosgym.envs.observation import OBSERVATION_NAMES
+from chaosgym.envs.kernels.steps import PLACE
 from chaosgym.envs.task import Task
 from chaosgym.machines.machine import Machine
 from chaosgym.machines.parameters import parameters_of
@@ -32,7 +32,6 @@ DOTS_PER_INCH = 100
 RENDER_SAMPLES = 8000
 """Samples of the motion kept of a step."""
 
-MEAN_PEAK = OBSERVATION_NAMES.index("mean_peak_force")
 
 STROBE = 12
 """Each step is shown at a moment of its last cycle, this fraction of a cycle later than the step before: every step
@@ -114,7 +113,7 @@ class Dashboard:
         """Take in a step."""
         self._speeds.append(float(info["speed"]))
         self._demands.append(float(info["demand"]))
-        self._peaks.append(float(observation[MEAN_PEAK]))
+        self._peaks.append(float(observation[PLACE.mean_peak_force]))
         self._wild.append(bool(info["type_iii"] > 0.5))
 
     def draw(self, record: CycleRecord) -> Frame | None:

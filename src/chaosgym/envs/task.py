@@ -34,6 +34,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from chaosgym.arrays import Array
+from chaosgym.envs.entries import AddedEntries
 from chaosgym.envs.kernels import steps
 from chaosgym.errors import ParameterError
 from chaosgym.machines.machine import Machine
@@ -55,7 +56,7 @@ class Status(IntEnum):
 
 
 @dataclass(frozen=True, kw_only=True)
-class Task:
+class Task(AddedEntries):
     """Drive, demand, sensors, disturbance and weights of a task; speeds are in the unit of the machine's speed field.
 
     Raises
@@ -73,12 +74,6 @@ class Task:
     highest_speed: float = _number(30.0, source="highest speed of the drive")
     slew_limit: float = _number(2.0, source="largest change of speed in a step")
     speed_grid: float = _number(0.0, source="spacing of the speeds that the drive can hold, 0 for none")
-    drive: str = parameter(
-        "constant",
-        choices=("constant", "motor"),
-        provenance="assumed",
-        source="whether the machine has the speed that is set, or its motor's torque takes it there",
-    )
     trim_step: float = _number(0.25, source="smallest change of the trim")
     largest_trim: float = _number(2.0, source="largest trim")
     lowest_demand: float = _number(18.0, source="lowest demand")
@@ -92,15 +87,6 @@ class Task:
     sensor_error: float = _number(1.0, unit="N", source="half width of the error of a measured peak force")
     bouncing_error: float = _number(0.05, source="half width of the error of the share of bouncing")
     missed_impacts: float = _number(0.05, high=1.0, source="share of the impacts that the counter misses")
-    monitor: str = parameter(
-        "off", choices=("off", "on"), provenance="assumed", source="whether the monitor's level is observed too"
-    )
-    classifier: str = parameter(
-        "off",
-        choices=("off", "on"),
-        provenance="assumed",
-        source="whether it is observed how likely the trained classifier of records holds the motion irregular",
-    )
     speed_ripple: float = _number(0.0, high=0.1, source="standard deviation of a cycle's speed, as a share of it")
     kick: float = _number(
         0.0, high=0.1, source="standard deviation of the change of each velocity once a cycle, as a share of its range"
@@ -154,11 +140,11 @@ class Task:
 
     @cached_property
     def numbers(self) -> NDArray[np.void]:
-        """One record of all fields for the kernels, with a choice as its place among the choices."""
+        """One record of all numbers for the kernels, with the kind of action as its place among the choices."""
         about = parameters_of(self)
-        given = {name: getattr(self, name) for name in about}
-        values = [about[name].choices.index(value) if about[name].choices else value for name, value in given.items()]
-        return np.array([tuple(values)], [(name, type(value)) for name, value in zip(about, values, strict=True)])
+        values = {name: getattr(self, name) for name in about if not about[name].choices}
+        values["action"] = about["action"].choices.index(self.action)
+        return np.array([tuple(values.values())], [(name, type(value)) for name, value in values.items()])
 
 
 LIFE_PRICE = 1000.0

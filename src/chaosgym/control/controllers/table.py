@@ -47,7 +47,7 @@ class Tables(NamedTuple):
 
 
 def readings_of(observations: NDArray[Any]) -> Array:
-    """Readings (n, 5) of observations (n, 14) from which the clearance is inferred."""
+    """Readings (n, 5) of observations (n, entries) from which the clearance is inferred."""
     felt = np.column_stack([seen(observations, name) for name in READINGS])
     return np.column_stack([np.log(felt[:, :3] + (1.0, 0.3, 0.3)), felt[:, 3:]])
 
