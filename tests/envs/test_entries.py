@@ -46,7 +46,7 @@ class Smallest(Entry):
     @staticmethod
     def bounds(task):
         """Those of any force."""
-        return 0.0, 5.0 * task.load_rating
+        return 0.0, 5.0 * task.reference_force
 
     def values(self, which, peaks, jobs):
         """Least peak of each."""
