@@ -104,7 +104,7 @@ class DesignStudy:
             lines += [f"  dearer, and better: {one.told}, cost {one.cost:.2f}, {_better(one)}" for one in self.dearer]
         elif self.improvement is not None:
             lines.append(f"  {self.improvement.told}")
-            if not found.checks:
+            if self.improvement.suggestions and not found.checks:
                 lines.append(f"  as it is: equivalent {force_of_machines(found):.1f} N over the machines built")
                 lines += [f"  next: {one.compared}" for one in self.improvement.suggestions[1:3]]
         if self.life_over_speed is None:
