@@ -43,7 +43,7 @@ def _(machine: JointedMachine, states: Array, peak_force: Array) -> float:
     if sets.sliders.speed.any():
         return 0.0
     surfaces = sets.springs, sets.dampers, machine.stops
-    return passive_share(machine.equations, *surfaces, machine.cycle_period, states, peak_force)
+    return passive_share(machine.without_friction, *surfaces, machine.cycle_period, states, peak_force)
 
 
 @bounded_share.register

@@ -29,6 +29,7 @@ def sweep_command(plan: SweepPlan, folder: str) -> str:
     words += ["--seed", str(plan.seed), "--budget", str(plan.budget)]
     for option, share in (("--signals", plan.signals), ("--full-types", plan.full_types)):
         words += [option, f"{share:g}"] if share else []
+    words += ["--initial-states", str(plan.initial_states)] if plan.full_types else []
     return shlex.join([*words, "--out", folder])
 
 
@@ -118,8 +119,8 @@ def _trust(plan: SweepPlan, info: Mapping[str, Any]) -> str:
         pairs = ", ".join(f"{pair} {count}" for pair, count in types["pairs"].items() if len(set(_words(pair))) > 1)
         lines.append(
             f"- Types from neighbours in speed and clearance against types over all tolerances "
-            f"({', '.join(default_tolerances(plan.machine))}; three initial states): {types['disagreement']:.1%} of "
-            f"{types['points']:,} points disagree ({pairs or 'none'})."
+            f"({', '.join(default_tolerances(plan.machine))}; {plan.initial_states} initial states): "
+            f"{types['disagreement']:.1%} of {types['points']:,} points disagree ({pairs or 'none'})."
         )
     return "## How far to trust the labels\n\n" + "\n".join(lines)
 

@@ -5,6 +5,7 @@ import numpy as np
 import pytest
 from click.testing import CliRunner
 
+from chaosgym.branches.coexistence import coexistence
 from chaosgym.branches.diagram_search import follow
 from chaosgym.branches.margins import margins
 from chaosgym.cli import app
@@ -74,8 +75,8 @@ def test_nothing_is_near_a_calm_orbit():
     assert found.largest_multiplier == pytest.approx(np.exp(-0.05 / 0.08), rel=1e-9)
 
 
-def test_kicks_find_the_other_motion():
-    """Between its folds an oscillator flies free or hits its stop; the larger kicks lead from one to the other."""
+def test_the_other_motion_and_where_both_end_are_told():
+    """Between its folds an oscillator flies free or hits its stop; a knock leads from one to the other."""
     speed = 0.238
     machine = oscillator(damping=0.02, stiffness=30.0, contact_damping=0.5, speed=speed, force=1.2, stops="one")
     rate = 2.0 * np.pi * speed
@@ -83,16 +84,27 @@ def test_kicks_find_the_other_motion():
     orbit = find_periodic_orbit(machine, [response.imag, rate * response.real], 1)
     assert orbit is not None
     assert simulate(machine, 1, orbit.state).peak_force.max() == 0.0
-    found = margins(machine, orbit, {"speed": Tolerance(0.05)}, kicks=60, workers=1)
+    found = margins(machine, orbit, {"speed": Tolerance(0.05)})
     (below, above) = found.margins
     assert below.kind in ("grazing", "fold")
     assert below.value == pytest.approx(0.23598, abs=1e-4)
     assert above.kind is None
-    assert found.kicks is not None
-    assert found.kicks.smallest_leaving is not None
-    (other,) = found.kicks.coexisting
+    verdict = diagnose(machine, initial_state=orbit.state)
+    beside = coexistence(machine, verdict, knocks=60, workers=1)
+    _, other = beside.attractors.motions
     assert other.nature == "periodic"
     assert other.largest_peak > 0.0
+    assert beside.shock is not None
+    assert beside.shock.leads_to == 1
+    flight, rattle = beside.spans
+    assert flight is not None
+    assert flight.below.speed == pytest.approx(below.value, rel=1e-9)
+    assert rattle is not None
+    dragged_on = dragged(machine, other.state, "speed", np.linspace(speed, rattle.above.speed * (1.0 - 1e-4), 60))
+    near, beyond = (rattle.above.speed * (1.0 + side * 1e-4) for side in (-1.0, 1.0))
+    assert simulate(with_settings(machine, {"speed": near}), 1, dragged_on).peak_force.max() > 0.0
+    fallen = dragged(machine, dragged_on, "speed", [beyond] * 40)
+    assert simulate(with_settings(machine, {"speed": beyond}), 1, fallen).peak_force.max() == 0.0
 
 
 def test_an_orbit_that_repels_has_no_margin():

@@ -13,6 +13,7 @@ from chaosgym.diagnosis import (
     response_type,
     types_on_grid,
 )
+from chaosgym.diagnosis.type_rule import Coexisting
 from chaosgym.errors import DiagnosisError, ParameterError
 from chaosgym.machines import THESIS_SLIDER_CRANK, ImpactBeam
 from tests.plain_modes import PLAIN_BEAM
@@ -37,8 +38,9 @@ QUIET = [(-0.5, "periodic", 50.0), (-1, "periodic", 52.0), (0.5, "periodic", 51.
         ("periodic", [*QUIET, (0.9, "chaotic", 50.0), (1, "chaotic", 50.0)], (), "II"),
         ("periodic", [*QUIET, (0.55, "chaotic", 50.0)], (), "III"),
         ("periodic", [*QUIET, (1, "chaotic", 50.0), (-1.5, "quasiperiodic", 50.0)], (), "III"),
-        ("periodic", QUIET, (50.1, 54.9), "I"),
-        ("periodic", QUIET, (50.1, 44.0), "III"),
+        ("periodic", QUIET, (("periodic", 50.1), ("periodic", 54.9)), "I"),
+        ("periodic", QUIET, (("periodic", 50.1), ("periodic", 44.0)), "III"),
+        ("periodic", QUIET, (("chaotic", 50.1),), "III"),
         ("chaotic", QUIET, (), "III"),
         ("quasiperiodic", QUIET, (), "III"),
         ("undetermined", QUIET, (), "undetermined"),
@@ -46,7 +48,7 @@ QUIET = [(-0.5, "periodic", 50.0), (-1, "periodic", 52.0), (0.5, "periodic", 51.
 )
 def test_types_follow_their_definition(nature, points, coexisting, expected):
     """The three rules of section 5.5, each at its threshold of 10 %."""
-    kind, reason = judge_type(nature, 50.0, around(*points), coexisting)
+    kind, reason = judge_type(nature, 50.0, around(*points), [Coexisting(*one) for one in coexisting])
     assert kind == expected
     assert reason
 
@@ -98,7 +100,8 @@ def test_types_of_the_beam(frequency, expected):
     """Smooth at 8 Hz, a periodic window at 19 Hz (print: Type III from 16 to 30 Hz), chaotic at 30 Hz."""
     result = response_type(PLAIN_BEAM.at(frequency), window="speed-clearance", budget=400)
     assert result.type == expected
-    assert len(result.neighbours) == (0 if frequency == 30.0 else 24)
+    # 24 from rest, four from states carried along the speed
+    assert len(result.neighbours) == (0 if frequency == 30.0 else 28)
     assert json.dumps(result.as_dict())
 
 

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from scipy.optimize import linprog
 
-from chaosgym.diagnosis.type_rule import Neighbour, judge_type, mixed, type_of_cross, types_on_grid
+from chaosgym.diagnosis.type_rule import Coexisting, Neighbour, judge_type, mixed, type_of_cross, types_on_grid
 from chaosgym.errors import DiagnosisError
 
 CALM_THROUGHOUT = "periodic throughout the tolerances, peak force less than 10 % higher"
@@ -15,6 +15,11 @@ def _with(*changed):
     """The calm neighbourhood with some points replaced."""
     kept = {point.place: point for point in CALM}
     return list((kept | {point.place: point for point in changed}).values())
+
+
+def motion(peak, nature="periodic"):
+    """Another motion of the same machine."""
+    return Coexisting(nature, peak)
 
 
 @pytest.mark.parametrize(
@@ -55,9 +60,22 @@ def _with(*changed):
             "II",
             "peak force 20% higher below the nominal speed",
         ),
-        ("periodic", CALM, (110.0, 91.0), "I", CALM_THROUGHOUT),
-        ("periodic", CALM, (100.0, 111.0), "III", "another initial state leads to 111 N instead of 100 N"),
-        ("periodic", CALM, (90.0,), "III", "another initial state leads to 90 N instead of 100 N"),
+        ("periodic", CALM, (motion(110.0), motion(91.0)), "I", CALM_THROUGHOUT),
+        (
+            "periodic",
+            CALM,
+            (motion(100.0), motion(111.0)),
+            "III",
+            "another initial state leads to 111 N instead of 100 N",
+        ),
+        ("periodic", CALM, (motion(90.0),), "III", "another initial state leads to 90 N instead of 100 N"),
+        (
+            "periodic",
+            CALM,
+            (motion(100.0, "chaotic"),),
+            "III",
+            "another initial state leads to a chaotic motion, up to 100 N",
+        ),
     ],
 )
 def test_types_of_written_neighbourhoods(nature, neighbours, coexisting, expected, reason):

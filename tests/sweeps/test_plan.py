@@ -3,6 +3,7 @@
 import json
 import time
 import tracemalloc
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -133,6 +134,9 @@ def test_plans_survive_their_settings():
     """Settings, as JSON keeps them, give the plan again; those of another kind of sampling are refused."""
     plan = SweepPlan(PLAIN_BEAM, CROSS_AXES, "crosses", 7, 3, 200, 0.2, 0.1)
     assert SweepPlan.from_settings(json.loads(json.dumps(plan.settings()))) == plan
+    without_search = {name: value for name, value in plan.settings().items() if name != "initial_states"}
+    assert SweepPlan.from_settings(without_search) == replace(plan, initial_states=3)
+    assert replace(plan, initial_states=3).settings() == without_search
     with pytest.raises(ParameterError, match="sampling = 'lattice' is unknown; allowed: grid, random, sobol, crosses"):
         SweepPlan.from_settings(plan.settings() | {"sampling": "lattice"})
 

@@ -87,14 +87,32 @@ class Branch:
         }
 
 
+class SweptMotion(NamedTuple):
+    """A motion that a machine has at one value.
+
+    ``branch`` is the number of the branch through it, from 1 on, or None; ``largest_peak`` in newton; ``share`` that of
+    the random starts that settle on it.
+    """
+
+    branch: int | None
+    nature: str
+    period: int | None
+    largest_peak: float
+    share: float
+
+
 class SweepPoint(NamedTuple):
-    """What a machine does at one value from rest: its nature, its period if it has one, and its peak forces [N]."""
+    """What a machine does at one value from rest: its nature, its period if it has one, and its peak forces [N].
+
+    ``motions`` are all that a search met, that from rest first; empty without one.
+    """
 
     value: float
     nature: str
     period: int | None
     peaks: Array
     state: Array
+    motions: tuple[SweptMotion, ...] = ()
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -138,7 +156,13 @@ class BifurcationDiagram:
             "high": self.high,
             "branches": [branch.as_dict() for branch in self.branches],
             "sweep": [
-                {"value": p.value, "nature": p.nature, "period": p.period, "peaks_N": p.peaks.tolist()}
+                {
+                    "value": p.value,
+                    "nature": p.nature,
+                    "period": p.period,
+                    "peaks_N": p.peaks.tolist(),
+                    "motions": [motion._asdict() for motion in p.motions],
+                }
                 for p in self.sweep
             ],
             "not_followed": list(self.not_followed),

@@ -1,8 +1,8 @@
 """Search for all branches of periodic orbits that a sweep along one field meets.
 
-Every periodic point of the sweep seeds a branch, unless a branch passes through it already. Where a
-stable orbit flips the doubled branch is followed too, and where it loses its symmetry one of the two new ones, which
-mirror each other.
+Every motion that rest or random starts lead to at a point of the sweep seeds a branch, if it repeats and no branch
+passes through it already: with the shares of the starts that is a global continuation. Where a stable orbit flips the
+doubled branch is followed too, and where it loses its symmetry one of the two new ones, which mirror each other.
 """
 
 from collections.abc import Iterator, Sequence
@@ -13,11 +13,12 @@ from tqdm import tqdm
 
 from chaosgym.arrays import Array
 from chaosgym.branches.bifurcation import Found, direction_of
-from chaosgym.branches.bifurcation_diagram import BifurcationDiagram, Branch, SweepPoint
+from chaosgym.branches.bifurcation_diagram import BifurcationDiagram, Branch, SweepPoint, SweptMotion
 from chaosgym.branches.branch import MOST_UNSTABLE, Stretch, stretch
 from chaosgym.branches.family_along import continuous_field, family_of, with_noise
 from chaosgym.branches.orbit_family import NotFollowedError, OrbitFamily
 from chaosgym.branches.orbit_point import OrbitPoint
+from chaosgym.diagnosis.attractors import Attractors, attractors
 from chaosgym.diagnosis.diagnose import diagnose
 from chaosgym.diagnosis.periodic_orbit import find_periodic_orbit
 from chaosgym.errors import ParameterError, SimulationError
@@ -30,6 +31,9 @@ SWEEP = 41
 
 SWEEP_BUDGET = 400
 """Cycles that each of them may take."""
+
+SWEEP_STARTS = 16
+"""Random starts at each point: what takes a fifth of them at one point is met there by 97 in 100 searches."""
 
 SHOWN_PEAKS = 60
 """Peak forces of a point of the sweep that does not repeat."""
@@ -63,6 +67,7 @@ def follow(
     span: tuple[float, float],
     *,
     sweep: int = SWEEP,
+    starts: int = SWEEP_STARTS,
     states: Sequence[tuple[float, Array, int]] = (),
     longest_period: int = LONGEST_PERIOD,
     most_unstable: float = MOST_UNSTABLE,
@@ -80,7 +85,9 @@ def follow(
     span
         Lowest and highest value, in the field's unit.
     sweep
-        Points of the sweep from rest that seeds branches; 0 for none.
+        Points of the sweep that seeds branches; 0 for none.
+    starts
+        Random starts at each of them, beside rest; 0 for rest alone.
     states
         Further seeds: (value, state (n_states,) near a periodic orbit, period in cycles).
     longest_period
@@ -108,23 +115,61 @@ def follow(
         raise ParameterError(f"{name} = {low:g} to {high:g} is empty or reversed; allowed: the lower value first")
     for value in (low, high):
         with_settings(machine, {name: value})
-    points = _swept(machine, name, np.linspace(low, high, sweep), workers) if sweep else []
-    seeds = [(p.value, p.state, p.period) for p in points if p.period is not None] + list(states)
+    points = _swept(machine, name, np.linspace(low, high, sweep), starts, workers) if sweep else []
     found = _Branches(machine, name, low, high, longest_period, most_unstable)
-    for value, state, period in tqdm(seeds, desc="branch", unit="seed", delay=PATIENCE, disable=not progress):
-        found.seed(value, np.asarray(state, dtype=float), period)
+    seeds = [
+        (one.period, place, point.value, one.state)
+        for place, (point, met) in enumerate(points)
+        for one in (met.motions if met else ())
+        if one.orbit is not None and one.period is not None
+    ]
+    seeds += [(p.period, place, p.value, p.state) for place, (p, met) in enumerate(points) if p.period and not met]
+    seeds += [(period, len(points), value, np.asarray(state, dtype=float)) for value, state, period in states]
+    # shorter periods first: a doubled branch then begins at its flip
+    seeds.sort(key=lambda seed: seed[0])
+    through: dict[int, list[int | None]] = {}
+    for period, place, value, state in tqdm(seeds, desc="branch", unit="seed", delay=PATIENCE, disable=not progress):
+        through.setdefault(place, []).append(found.seed(value, state, period))
     return BifurcationDiagram(
-        machine=machine, field=name, low=low, high=high, branches=tuple(found.branches), sweep=tuple(points)
+        machine=machine,
+        field=name,
+        low=low,
+        high=high,
+        branches=tuple(found.branches),
+        sweep=tuple(_with_motions(point, met, through.get(place, [])) for place, (point, met) in enumerate(points)),
     )
 
 
-def _swept(machine: Machine, name: str, values: Array, workers: int | None) -> list[SweepPoint]:
-    def one(value: float) -> SweepPoint:
-        verdict = diagnose(with_settings(machine, {name: value}), budget=SWEEP_BUDGET)
+def _with_motions(point: SweepPoint, met: Attractors | None, through: list[int | None]) -> SweepPoint:
+    """The point with the motions that were met there, the proven ones of them with the branches ``through`` them."""
+    if met is None:
+        return point
+    proven = [one for one in met.motions if one.orbit is not None]
+    proven.sort(key=lambda one: one.period or 0)
+    number = {id(one): branch for one, branch in zip(proven, through, strict=True)}
+    return point._replace(
+        motions=tuple(
+            SweptMotion(number.get(id(one)), one.nature, one.period, one.largest_peak, met.share(one)[0])
+            for one in met.motions
+        )
+    )
+
+
+_Swept = tuple[SweepPoint, Attractors | None]
+"""A point of the sweep, and the motions that random starts met there."""
+
+
+def _swept(machine: Machine, name: str, values: Array, starts: int, workers: int | None) -> list[_Swept]:
+    def one(value: float) -> _Swept:
+        there = with_settings(machine, {name: value})
+        verdict = diagnose(there, budget=SWEEP_BUDGET)
         repeats = verdict.period if verdict.status == "certified" else None
         peaks = verdict.run.peak_force.max(axis=1)[-(repeats or SHOWN_PEAKS) :]
         state = np.asarray(verdict.evidence["final_state"])
-        return SweepPoint(float(value), verdict.nature, repeats, peaks, state)
+        point = SweepPoint(float(value), verdict.nature, repeats, peaks, state)
+        if not starts:
+            return point, None
+        return point, attractors(there, starts=starts, budget=SWEEP_BUDGET, centre=verdict, workers=1)
 
     return parallel_map(one, values, workers=workers)
 
@@ -139,20 +184,22 @@ class _Branches:
         self._machine, self._name, self._low, self._high = machine, name, low, high
         self._longest, self._most_unstable = longest, most_unstable
 
-    def seed(self, value: float, state: Array, period: int) -> None:
-        """Follow the branch through a state, and all that begin on it, unless it is known."""
+    def seed(self, value: float, state: Array, period: int) -> int | None:
+        """Follow the branch through a state, and all that begin on it, unless it is known; return its number from 1."""
         orbit = find_periodic_orbit(with_settings(self._machine, {self._name: value}), state, period)
         if orbit is None:
-            return
+            return None
         family = family_of(self._machine, self._name, self._low, self._high, orbit.state, period)
         family = with_noise(family, orbit.state)
         s = (value - self._low) / (self._high - self._low)
         try:
             start = family.solve(np.append(family.weight * orbit.state, s), _upwards(family, orbit.state))
         except NotFollowedError:
-            return
-        if self._known(family, start):
-            return
+            return None
+        number = self._known(family, start)
+        if number is not None:
+            return number
+        number = len(self.branches) + 1
         seed = f"seed at {self._name} = {value:.6g}"
         ahead = back = Stretch([start], [], [], seed)
         if s < 1.0:
@@ -160,6 +207,7 @@ class _Branches:
         if s > 0.0 and not ahead.end.startswith("closed"):
             back = stretch(family, _turned(start, -1.0), most_unstable=self._most_unstable)
         self._add(_joined(family, back, ahead, seed))
+        return number
 
     def _add(self, branch: Branch) -> None:
         self.branches.append(branch)
@@ -196,20 +244,22 @@ class _Branches:
                 break
         else:
             return
-        if not 0.0 <= start.x[-1] <= 1.0 or self._known(family, start):
+        if not 0.0 <= start.x[-1] <= 1.0 or self._known(family, start) is not None:
             return
         ahead = stretch(family, start, first_step=0.01, most_unstable=min(self._most_unstable, BESIDE))
         named = f"{at.bifurcation.kind} at {self._name} = {at.bifurcation.value:.8g}"
         self._add(_joined(family, Stretch([start], [], [], named), ahead, named))
 
-    def _known(self, family: OrbitFamily, point: OrbitPoint) -> bool:
-        """True if a branch passes through an orbit, or through its mirror image."""
-        return any(
-            _alike(found, point)
-            for branch in self.branches
+    def _known(self, family: OrbitFamily, point: OrbitPoint) -> int | None:
+        """Number, from 1 on, of a branch that passes through an orbit or its mirror image; None if none does."""
+        through = (
+            number
+            for number, branch in enumerate(self.branches, 1)
             if branch.period == family.period
             for found in _orbits_at(branch, float(point.x[-1]), point)
+            if _alike(found, point)
         )
+        return next(through, None)
 
 
 def _upwards(family: OrbitFamily, state: Array) -> Array:

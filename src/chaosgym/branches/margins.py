@@ -4,7 +4,7 @@ Each parameter that has a tolerance is varied alone, to either side, up to some 
 both ends are stable, have the same contacts and lie nearly in a line with the nominal one, nothing happens between
 them; elsewhere the branch is followed until stability ends.
 
-A margin follows this motion. Another attractor may coexist, which a kick reaches: ``kicks`` samples how large.
+A margin follows this motion. What lives beside it, ``coexistence`` tells.
 """
 
 from collections.abc import Mapping
@@ -17,7 +17,6 @@ from chaosgym.arrays import Array
 from chaosgym.branches.bifurcation import Kind
 from chaosgym.branches.branch import stretch
 from chaosgym.branches.family_along import family_of, with_noise
-from chaosgym.branches.kicks import Kicks, kicked
 from chaosgym.branches.orbit_family import NotFollowedError, OrbitFamily, contacts_of
 from chaosgym.branches.orbit_point import OrbitPoint
 from chaosgym.branches.section import better_section
@@ -77,14 +76,11 @@ class Margins:
         Below and above for each parameter.
     tolerances
         By field.
-    kicks
-        What kicks do, if they were asked for.
     """
 
     largest_multiplier: float
     margins: tuple[Margin, ...]
     tolerances: Mapping[str, Tolerance]
-    kicks: Kicks | None = None
 
     @property
     def nearest(self) -> Margin | None:
@@ -99,9 +95,6 @@ class Margins:
             "margins": [margin._asdict() for margin in self.margins],
             "nearest": self.nearest._asdict() if self.nearest else None,
             "tolerances": {name: tolerance._asdict() for name, tolerance in self.tolerances.items()},
-            "kicks": None
-            if self.kicks is None
-            else {**self.kicks._asdict(), "coexisting": [one._asdict() for one in self.kicks.coexisting]},
         }
 
 
@@ -111,9 +104,6 @@ def margins(
     tolerances: Mapping[str, Tolerance] | None = None,
     *,
     reach: float = REACH,
-    kicks: int = 0,
-    seed: int = 0,
-    workers: int | None = None,
 ) -> Margins:
     """Distance of a periodic orbit to the nearest loss of stability along each tolerance.
 
@@ -127,12 +117,6 @@ def margins(
         By field; ``default_tolerances(machine)`` by default.
     reach
         Tolerances up to which stability is followed.
-    kicks
-        Random kicks of the state to try; none by default.
-    seed
-        Of the kicks.
-    workers
-        Threads of the kicks; all processors by default.
 
     Raises
     ------
@@ -164,7 +148,6 @@ def margins(
         largest_multiplier=orbit.largest_multiplier,
         margins=found,
         tolerances=chosen,
-        kicks=kicked(machine, orbit, kicks, seed, workers) if kicks else None,
     )
 
 

@@ -165,7 +165,24 @@ def _lines(diagram: Any) -> list[str]:
             ]
         ),
     ]
-    return lines + [f"  {line}" for line in diagram.not_followed]
+    return lines + [f"  {line}" for line in diagram.not_followed] + _share_lines(diagram, unit)
+
+
+def _share_lines(diagram: Any, unit: str) -> list[str]:
+    """Where several motions live side by side, and their largest shares of the random starts."""
+    largest: dict[int | None, list[float]] = {}
+    several = [point for point in diagram.sweep if len(point.motions) > 1]
+    for point in several:
+        for one in point.motions:
+            largest.setdefault(one.branch, []).append(one.share)
+    if not several:
+        return []
+    told = ", ".join(
+        f"{'no branch' if number is None else f'branch {number}'} up to {max(shares):.0%}"
+        for number, shares in sorted(largest.items(), key=lambda pair: (pair[0] is None, pair[0]))
+    )
+    places = f"{several[0].value:.6g} to {several[-1].value:.6g} {unit}"
+    return [f"several motions at {len(several)} of {len(diagram.sweep)} values, {places}; of random starts: {told}"]
 
 
 def _at_most(lines: list[str]) -> list[str]:

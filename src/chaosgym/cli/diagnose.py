@@ -42,7 +42,9 @@ from chaosgym.machines import MACHINES
     help="Tolerances up to which margins are looked for.",
 )
 @click.option(
-    "--kicks", type=click.IntRange(1, 10**5), help="With --margins: kicks of the state, and the motions they lead to."
+    "--kicks",
+    type=click.IntRange(1, 10**5),
+    help="With --margins: knocks tried, for the smallest that leaves.",
 )
 @click.option("--step-check", is_flag=True, help="Repeat with a finer step and say whether the verdict stays.")
 @click.option("--sweep", metavar="FILE", help="Peak forces at many speeds, with a column of speeds: Types I, II, III.")
@@ -125,9 +127,10 @@ def diagnose(
         if measured.sensor_sigma is not None:
             raise click.UsageError("--sensor-sigma belongs to --peaks or --series")
         with patience("diagnose"):
-            result, lines, verdict = _diagnose_machine(machine, budget, types, step_check, measured.sensor_error or 0.0)
+            sensor_error = measured.sensor_error or 0.0
+            result, lines, verdict, motions = _diagnose_machine(machine, budget, types, step_check, sensor_error)
             if margins:
-                _add_margins(machine, verdict, reach, kicks or 0, result, lines)
+                _add_margins(machine, verdict, reach, kicks or 0, result, lines, motions)
         draw(picture, lambda plots: plots.diagnosis_figure(verdict), result, lines)
     emit(result, as_json, lambda: lines)
 
@@ -218,7 +221,8 @@ def _forces(machine: Any, verdict: Any) -> tuple[dict[str, Any], list[str]]:
 
 def _diagnose_machine(
     machine: Any, budget: int, types: bool, check: bool, sensor_error: float
-) -> tuple[dict[str, Any], list[str], Any]:
+) -> tuple[dict[str, Any], list[str], Any, Any]:
+    """The verdict, and the motions of the machine if they were looked for."""
     from chaosgym.diagnosis import diagnose, response_type, signs_of_chaos
     from chaosgym.diagnosis.step_check import step_check
 
@@ -243,24 +247,29 @@ def _diagnose_machine(
     lines += [f"  {sign.line}" for sign in signs]
     if not verdict.judged.peak_force.any():
         lines.append(f"  {result['warnings'][-1]}")
+    motions = None
     if types:
         judged = response_type(machine, budget=budget, sensor_error=sensor_error, centre=verdict)
+        motions = judged.attractors
         result |= {"response_type": judged.type, "response_type_reason": judged.reason}
+        result["attractors"] = None if motions is None else motions.as_dict()
         lines.append(f"  Type {judged.type}: {judged.reason}")
+        lines += [f"  {line}" for line in motions.lines] if motions else []
     if check:
         compared = step_check(machine, verdict, budget=budget, sensor_error=sensor_error)
         result["step_check"] = compared.as_dict()
         lines.append(f"  {compared.summary}")
-    return result, lines, verdict
+    return result, lines, verdict, motions
 
 
 def _add_margins(
-    machine: Any, verdict: Any, reach: float, kicks: int, result: dict[str, Any], lines: list[str]
+    machine: Any, verdict: Any, reach: float, kicks: int, result: dict[str, Any], lines: list[str], motions: Any
 ) -> None:
-    """Add the margins of a certified orbit, or why there are none."""
+    """Add the margins of a certified orbit and what lives beside it, or why there are none."""
+    from chaosgym.branches.coexistence import coexistence
     from chaosgym.branches.margins import margins_of
 
-    found = margins_of(machine, verdict, reach=reach, kicks=kicks)
+    found = margins_of(machine, verdict, reach=reach)
     if found is None:
         result["margins"] = None
         lines.append(f"  no margins: they need a periodic response that is proven, this one is {verdict.words}")
@@ -268,8 +277,11 @@ def _add_margins(
     result["margins"] = found.as_dict()
     lines.append(f"  largest multiplier {found.largest_multiplier:.3g}; stability ends, in tolerances:")
     lines += [f"    {line}" for line in _margin_lines(machine, found, reach)]
-    if found.kicks is not None:
-        lines += [f"  {line}" for line in _kick_lines(found.kicks)]
+    beside = coexistence(machine, verdict, motions, knocks=kicks)
+    result["coexistence"] = beside.as_dict()
+    for line in motions.lines if motions else ():
+        lines.remove(f"  {line}")
+    lines += [f"  {line}" for line in beside.lines]
 
 
 def _margin_lines(machine: Any, found: Any, reach: float) -> list[str]:
@@ -283,16 +295,6 @@ def _margin_lines(machine: Any, found: Any, reach: float) -> list[str]:
             text = f"{sign}{margin.share:.2f} {margin.end}" if margin.end else f"{sign} none within {reach:g}"
         told.setdefault(margin.parameter, []).append(text)
     return [f"{name:22s} {'; '.join(texts)}" for name, texts in told.items()]
-
-
-def _kick_lines(kicks: Any) -> list[str]:
-    if kicks.smallest_leaving is None:
-        return [f"all of {kicks.tried} kicks of up to the size of the motion come back"]
-    rows = [f"smallest of {kicks.tried} kicks that leads elsewhere: {kicks.smallest_leaving:.2g} of the motion's size"]
-    for one in kicks.coexisting:
-        period = f", period {one.period}" if one.period else ""
-        rows.append(f"  {one.kicks} to {one.nature}{period}, largest peak {one.largest_peak:.2f} N")
-    return rows
 
 
 @machine_command

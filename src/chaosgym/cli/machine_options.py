@@ -7,6 +7,7 @@ a unit, as in ``0.127 mm``; bare ones are in the option's.
 
 import functools
 from collections.abc import Callable, Iterable, Mapping
+from pathlib import Path
 from typing import Any
 
 import click
@@ -16,6 +17,9 @@ from chaosgym.cli.output import AS_JSON, note_machine
 from chaosgym.errors import ParameterError
 from chaosgym.machines import FILE_ENDING, MACHINES
 from chaosgym.machines.machine import Choice, Number, Option
+
+START_CYCLES = 32
+"""Cycles from rest by which the box of random initial states is scaled."""
 
 BASE = {"mm": "m", "arcmin": "rad"}
 """Unit of the field behind an option, where it is another than the option's."""
@@ -156,16 +160,25 @@ def machine_command(
     own = {parameter.name for parameter in getattr(function, "__click_params__", [])} | {"as_json"}
 
     @functools.wraps(function)
-    def wrapped(machine: str | None, settings: tuple[str, ...], fidelity: str | None, **others: Any) -> None:
+    def wrapped(
+        machine: str | None, settings: tuple[str, ...], fidelity: str | None, initial_state: str | None, **others: Any
+    ) -> None:
         given = {f"--{name.replace('_', '-')}": others.pop(name) for name in set(others) - own}
         given = {name: value for name, value in given.items() if value is not None}
-        if machine is None and (settings or given or fidelity):
+        if machine is None and (settings or given or fidelity or initial_state):
             raise click.UsageError(f"these options need a machine: {', '.join(MACHINES)}")
         built = machine and build_machine(machine, given, settings, fidelity)
+        if built and initial_state:
+            built = built.from_state(_initial_state(built, initial_state))
         if built:
             note_machine(built)
         function(machine=built, **others)
 
+    wrapped = click.option(
+        "--initial-state",
+        metavar="FILE|rest|random:SEED",
+        help="State from which it runs: a file of its numbers in SI units, or JSON; rest if left out.",
+    )(wrapped)
     wrapped = click.option(
         "--fidelity", metavar="RUNG", help="Rung of the machine's ladder of models, such as fine or reference."
     )(wrapped)
@@ -179,6 +192,29 @@ def machine_command(
     wrapped = AS_JSON(wrapped)
     wrapped = click.argument("machine", type=MachineName(), required=required)(wrapped)
     return click.command(cls=MachineCommand, before=before)(wrapped)
+
+
+def _initial_state(machine: Any, text: str) -> Any:
+    """State that --initial-state names; one of the random starts of the search for other motions by its seed."""
+    if text == "rest":
+        return ()
+    if text.startswith("random:"):
+        from chaosgym.diagnosis.start_box import start_box
+        from chaosgym.simulation import rest_state, simulate
+
+        seed = text.removeprefix("random:")
+        if not seed.isdecimal():
+            raise click.UsageError(f"--initial-state {text!r} has no seed; allowed: random:0, random:1, ...")
+        return start_box(machine, simulate(machine, START_CYCLES, rest_state(machine))).draw(1, int(seed))[0]
+    try:
+        content = Path(text).read_text("utf-8")
+        return [float(word) for word in content.translate(str.maketrans("[],;", "    ")).split()]
+    except OSError as error:
+        raise click.UsageError(f"--initial-state {text!r} can't be read: {error.strerror}") from error
+    except ValueError as error:
+        raise click.UsageError(
+            f"--initial-state {text!r} holds no numbers alone; allowed: a state in SI units"
+        ) from error
 
 
 def build_machine(name: str, given: Mapping[str, Any], settings: tuple[str, ...], fidelity: str | None = None) -> Any:

@@ -34,6 +34,13 @@ from chaosgym.cli.output import AS_JSON, WORKERS, draw, emit, picture_path, plot
 )
 @click.option("--signals", type=float, default=0.0, help="Share of the points whose signals are kept, 0 to 1.")
 @click.option("--full-types", type=float, default=0.0, help="Share of the points typed over all tolerances, 0 to 1.")
+@click.option(
+    "--initial-states",
+    type=click.IntRange(1),
+    default=48,
+    show_default=True,
+    help="With --full-types: random starts that look for other motions, or 3 as in datasets that state no number.",
+)
 @WORKERS
 @click.option("--scheduler", metavar="tcp://HOST:PORT", help="Compute on a Dask cluster (extra [cluster]).")
 @click.option("--repair", is_flag=True, help="Compute damaged chunks again.")
@@ -51,6 +58,7 @@ def sweep(
     budget: int,
     signals: float,
     full_types: float,
+    initial_states: int,
     workers: int | None,
     scheduler: str | None,
     repair: bool,
@@ -67,6 +75,8 @@ def sweep(
     from chaosgym.sweeps.plan import default_axes
 
     picture = picture_path(plot, f"sweep-{machine.name}")
+    if machine.initial_state:
+        raise click.UsageError("the labels of a sweep are those of runs from rest: leave --initial-state out")
     sizes = {"random": random_size, "sobol": sobol_size, "crosses": cross_count}
     given = [name for name, size in sizes.items() if size]
     if len(given) > 1:
@@ -75,7 +85,7 @@ def sweep(
     units = {name: about.unit for name, about in parameters_of(machine).items()}
     axes = tuple("=".join([field_named(machine, field), *span]) for field, *span in (text.split("=") for text in axes))
     chosen = tuple(Axis.parse(text, units) for text in axes) or default_axes(machine, kind)
-    plan = SweepPlan(machine, chosen, kind, sizes.get(kind) or 0, seed, budget, signals, full_types)
+    plan = SweepPlan(machine, chosen, kind, sizes.get(kind) or 0, seed, budget, signals, full_types, initial_states)
     if routes and (kind != "grid" or len(chosen) != 1):
         raise click.UsageError("--routes needs a grid of one axis: --axis FIELD=LOW:HIGH:COUNT once")
     if routes:

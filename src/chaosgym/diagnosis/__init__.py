@@ -1,5 +1,6 @@
 """Verdicts on machines: nature with proof, Types I, II and III over the tolerances, signs of chaos."""
 
+from chaosgym.diagnosis.attractors import Attractor, Attractors, attractors
 from chaosgym.diagnosis.diagnose import diagnose
 from chaosgym.diagnosis.lyapunov import largest_lyapunov_exponent, lyapunov_spectrum
 from chaosgym.diagnosis.matrix_update import compare_attractors, compare_outcomes, matrix_update_test
@@ -11,12 +12,15 @@ from chaosgym.diagnosis.type_rule import Neighbour, judge_type, types_on_grid
 from chaosgym.diagnosis.verdict import MachineDiagnosis
 
 __all__ = [
+    "Attractor",
+    "Attractors",
     "MachineDiagnosis",
     "Neighbour",
     "PeriodicOrbit",
     "ResponseMap",
     "ResponseType",
     "Tolerance",
+    "attractors",
     "bounce_fraction",
     "compare_attractors",
     "compare_outcomes",

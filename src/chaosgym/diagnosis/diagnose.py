@@ -76,7 +76,7 @@ def diagnose(
     machine
         What to judge.
     initial_state
-        Rest by default; part of the label.
+        The machine's own by default, which is rest unless it states another; part of the label.
     budget
         Cycles that the last stage may reach, at least 100. Chaos takes them all, a periodic response mostly 16 to 100.
     sensor_error
@@ -124,6 +124,8 @@ def diagnose_alone(
     integrator: Integrator | None = None,
 ) -> MachineDiagnosis:
     """``diagnose`` without the vote of the Matrix Update Test, which judges a machine by other machines."""
+    if initial_state is None and machine.initial_state:
+        initial_state = machine.initial_state
     if budget < FIRST_STAGE:
         raise DiagnosisError(f"budget = {budget} cycles is out of range; allowed: {FIRST_STAGE} or more")
     exact = integrator is None or isinstance(integrator, ExactEvents)

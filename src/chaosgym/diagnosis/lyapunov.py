@@ -26,6 +26,7 @@ from chaosgym.simulation import (
     ExactEvents,
     Integrator,
     MotionState,
+    begin_state,
     rest_state,
     simulate,
     simulate_with_deviations,
@@ -57,7 +58,7 @@ class Deviation:
         initial_state: MotionState | ArrayLike | None = None,
         integrator: Integrator | None = None,
     ) -> None:
-        rest = rest_state(machine)
+        rest = begin_state(machine)
         given = rest if initial_state is None else initial_state
         self.state = given if isinstance(given, MotionState) else MotionState(np.array(given, float), rest.bouncing)
         self._machine = machine

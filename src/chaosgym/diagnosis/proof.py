@@ -18,7 +18,7 @@ def proven_orbit(machine: Machine, record: CycleRecord, period: int) -> tuple[Pe
     found = find_periodic_orbit(machine, record.final_state, period)
     if found is None or not found.certified or not _approaches(machine, record, found):
         return None, 8 * period
-    return _primitive(machine, found), 14 * period
+    return primitive(machine, found), 14 * period
 
 
 def returning_period(section: Array, longest: int, seen: int = 4, back: float = 0.0) -> int:
@@ -33,7 +33,7 @@ def returning_period(section: Array, longest: int, seen: int = 4, back: float = 
     return int(np.argmax(gaps <= max(1.5 * float(gaps.min()), back))) + 1
 
 
-def _primitive(machine: Machine, orbit: PeriodicOrbit) -> PeriodicOrbit:
+def primitive(machine: Machine, orbit: PeriodicOrbit) -> PeriodicOrbit:
     """The orbit with its smallest period: a multiple of it closes too."""
     if orbit.period == 1:
         return orbit

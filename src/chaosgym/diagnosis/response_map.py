@@ -13,11 +13,12 @@ from chaosgym.diagnosis.response_type import (
     Tolerance,
     check_initial_states,
     chosen_tolerances,
-    coexisting_peaks,
+    coexisting,
     define,
+    motions_beside,
     region_points,
 )
-from chaosgym.diagnosis.type_rule import Neighbour, judge_type
+from chaosgym.diagnosis.type_rule import Coexisting, Neighbour, judge_type
 from chaosgym.diagnosis.verdict import MachineDiagnosis
 from chaosgym.errors import DiagnosisError, SimulationError
 from chaosgym.machines import Machine
@@ -132,8 +133,8 @@ def response_map(
         except (DiagnosisError, SimulationError):
             return None
 
-    found = parallel_map(judge, places, workers=workers, progress="map" if progress else None)
-    runs = dict(zip(places, found, strict=True))
+    verdicts = parallel_map(judge, places, workers=workers, progress="map" if progress else None)
+    runs = dict(zip(places, verdicts, strict=True))
     types, natures = np.full(shape, "undetermined"), np.full(shape, "undetermined")
     peaks = np.full(shape, np.nan)
     for at, place in centres.items():
@@ -141,9 +142,10 @@ def response_map(
         if centre is None:
             continue
         natures[at], peaks[at] = centre.nature, centre.evidence["largest_peak"]
-        others: tuple[float, ...] = ()
+        others: tuple[Coexisting, ...] = ()
         if initial_states > 1 and centre.nature == "periodic":
-            others = coexisting_peaks(at_place(place), centre, initial_states, budget)
+            found, _ = motions_beside(at_place(place), centre, initial_states, budget, workers)
+            others = coexisting(found, centre)
         neighbours = [_neighbour(one, runs[near]) for one, near in zip(points, around[at], strict=True)]
         types[at] = judge_type(centre.nature, float(peaks[at]), neighbours, others)[0]
     return ResponseMap(

@@ -1,8 +1,9 @@
 """Types I, II and III of a response over a tolerance neighbourhood: what a designer may rely on (thesis 5.5).
 
 The machine is run at its nominal parameters and at points half a tolerance and a whole one away: every combination of
-speed and clearance, and each other parameter by itself, each from rest. The statistic is the largest peak force of the
-settled cycles.
+speed and clearance, and each other parameter by itself, each from rest; at the speeds beside the nominal one also from
+states carried up and down the speed. ``attractors`` looks for other motions of the nominal machine. The statistic is
+the largest peak force of the settled cycles.
 
 What follows from that is the rule of ``type_rule``. Window, statistic and initial states are part of the label.
 """
@@ -12,19 +13,23 @@ from dataclasses import dataclass, field, replace
 from itertools import product
 from typing import Any, Literal, NamedTuple
 
-import numpy as np
-
+from chaosgym.arrays import Array
+from chaosgym.diagnosis.attractors import STARTS, Attractors, attractors
+from chaosgym.diagnosis.carried import carried_states
 from chaosgym.diagnosis.diagnose import diagnose
-from chaosgym.diagnosis.type_rule import FORCE_CHANGE, Neighbour, apart, judge_type
+from chaosgym.diagnosis.type_rule import FORCE_CHANGE, Coexisting, Neighbour, judge_type
 from chaosgym.diagnosis.verdict import MachineDiagnosis
 from chaosgym.errors import DiagnosisError
 from chaosgym.machines import Machine
 from chaosgym.machines.parameters import by_field, parameters_of, with_settings
 from chaosgym.series.verdict import Type
-from chaosgym.simulation import MotionState, parallel_map, rest_state
+from chaosgym.simulation import parallel_map
 
 Window = Literal["parameters", "speed-clearance"]
 Start = Literal["rest", "continuation"]
+
+FEWEST_STARTS = 16
+"""Random starts from which on other motions are searched for; fewer initial states are rest, or three fixed ones."""
 
 SHARES = (-1.0, -0.5, 0.5, 1.0)
 """Points of the region along one parameter, in tolerances."""
@@ -83,8 +88,8 @@ class ResponseType:
         Largest peak force of its settled cycles, both sides [N].
     neighbours
         What each point of the neighbourhood does; empty if the centre decides alone.
-    coexisting_peaks
-        Largest peak from each of the other initial states at the centre [N].
+    attractors
+        The motions at the centre, and how far was looked; None unless it is periodic and others were looked for.
     definition
         Window, statistic and initial states: part of the label. Plain values.
     """
@@ -94,18 +99,25 @@ class ResponseType:
     centre: MachineDiagnosis
     largest_peak: float
     neighbours: tuple[Neighbour, ...] = field(repr=False)
-    coexisting_peaks: tuple[float, ...]
+    attractors: Attractors | None = field(repr=False)
     definition: Mapping[str, Any] = field(repr=False)
 
     @property
+    def coexisting_peaks(self) -> tuple[float, ...]:
+        """Largest peak of each of the other motions at the centre [N]."""
+        return tuple(one.largest_peak for one in coexisting(self.attractors, self.centre))
+
+    @property
     def coexists(self) -> bool:
-        """Whether the centre repeats, but with another force from another initial state."""
-        return self.centre.nature == "periodic" and any(apart(one, self.largest_peak) for one in self.coexisting_peaks)
+        """Whether the centre repeats, but another initial state leads to a motion of another force or nature."""
+        others = coexisting(self.attractors, self.centre)
+        return self.centre.nature == "periodic" and judge_type("periodic", self.largest_peak, (), others)[0] == "III"
 
     def over(self, built: Sequence[Neighbour]) -> "ResponseType":
         """Return the type over more machines of the region."""
         centre = self.centre.nature, self.largest_peak
-        kind, reason = judge_type(*centre, [*self.neighbours, *built], self.coexisting_peaks)
+        others = coexisting(self.attractors, self.centre)
+        kind, reason = judge_type(*centre, [*self.neighbours, *built], others)
         return replace(self, type=kind, reason=reason)
 
     def as_dict(self) -> dict[str, Any]:
@@ -117,6 +129,7 @@ class ResponseType:
             "largest_peak": self.largest_peak,
             "neighbours": [neighbour._asdict() for neighbour in self.neighbours],
             "coexisting_peaks": list(self.coexisting_peaks),
+            "attractors": None if self.attractors is None else self.attractors.as_dict(),
             "definition": dict(self.definition),
         }
 
@@ -127,7 +140,7 @@ def response_type(
     *,
     window: Window = "parameters",
     start: Start = "rest",
-    initial_states: int = 3,
+    initial_states: int = STARTS,
     budget: int = 1600,
     sensor_error: float = 0.0,
     centre: MachineDiagnosis | None = None,
@@ -147,8 +160,9 @@ def response_type(
     start
         Where the runs of the neighbourhood start: at rest, or in the state that the centre ended in.
     initial_states
-        How many initial states look for coexisting attractors at the centre, 1 to 3: rest; the mirror image of the
-        state that rest leads to; half that state.
+        How many initial states look for other motions at the centre. 16 or more: so many random starts of
+        ``attractors``, and states carried along the speed. 3: rest, the mirror image of the state that rest leads to,
+        and half that state, as in datasets that say so. 1: rest alone.
     budget
         Cycles that each run may take.
     sensor_error
@@ -180,7 +194,7 @@ def response_type(
     centre = centre or diagnose(machine, budget=budget, sensor_error=sensor_error)
     origin = centre.evidence["final_state"] if start == "continuation" else None
     neighbours: tuple[Neighbour, ...] = ()
-    coexisting: tuple[float, ...] = ()
+    found: Attractors | None = None
     if centre.nature == "periodic":
         points = region_points(machine, allowed)
         machines = [
@@ -198,16 +212,41 @@ def response_type(
             Neighbour(shares, run.nature, run.evidence["largest_peak"])
             for shares, run in zip(points, runs, strict=True)
         )
-        coexisting = coexisting_peaks(machine, centre, initial_states, budget)
-    kind, reason = judge_type(centre.nature, centre.evidence["largest_peak"], neighbours, coexisting)
+        if initial_states > 1:
+            found, carried = _beside(machine, centre, allowed, initial_states, budget, workers)
+            neighbours += carried
+    largest = centre.evidence["largest_peak"]
+    kind, reason = judge_type(centre.nature, largest, neighbours, coexisting(found, centre))
     return ResponseType(
         type=kind,
         reason=reason,
         centre=centre,
-        largest_peak=centre.evidence["largest_peak"],
+        largest_peak=largest,
         neighbours=neighbours,
-        coexisting_peaks=coexisting,
+        attractors=found,
         definition=define(allowed, window, start, initial_states, budget, sensor_error),
+    )
+
+
+def _beside(
+    machine: Machine,
+    centre: MachineDiagnosis,
+    tolerances: Mapping[str, Tolerance],
+    initial_states: int,
+    budget: int,
+    workers: int | None,
+) -> tuple[Attractors, tuple[Neighbour, ...]]:
+    """The motions at the centre, and what states carried along the speed do at the speeds of the region."""
+    name = machine.speed_field
+    nominal = float(getattr(machine, name))
+    shares = {tolerances[name].at(nominal, share): share for share in SHARES} if name in tolerances else {}
+    found, carried = motions_beside(machine, centre, initial_states, budget, workers, tuple(shares))
+    runs = parallel_map(
+        lambda one: diagnose(machine.at(speed=one[0]), initial_state=one[1], budget=budget), carried, workers=workers
+    )
+    return found, tuple(
+        Neighbour({name: shares[speed]}, run.nature, run.evidence["largest_peak"])
+        for (speed, _), run in zip(carried, runs, strict=True)
     )
 
 
@@ -235,21 +274,40 @@ def chosen_tolerances(
 
 
 def check_initial_states(initial_states: int) -> None:
-    """Refuse a number of initial states that is not 1, 2 or 3."""
-    if initial_states not in (1, 2, 3):
-        raise DiagnosisError(f"initial_states = {initial_states!r} is out of range; allowed: 1, 2 or 3")
+    """Refuse a number of initial states that is neither 1, 3 nor enough for a search."""
+    if initial_states not in (1, 3) and not initial_states >= FEWEST_STARTS:
+        raise DiagnosisError(
+            f"initial_states = {initial_states!r} is out of range; allowed: 1, 3, or {FEWEST_STARTS} or more"
+        )
 
 
-def coexisting_peaks(machine: Machine, centre: MachineDiagnosis, initial_states: int, budget: int) -> tuple[float, ...]:
-    """Largest peak from each of the other initial states at a periodic centre [N]."""
-    rest = rest_state(machine)
-    reached = np.asarray(centre.evidence["final_state"])
-    return tuple(
-        diagnose(machine, initial_state=MotionState(share * reached, rest.bouncing), budget=budget).evidence[
-            "largest_peak"
-        ]
-        for share in (-1.0, 0.5)[: initial_states - 1]
+def motions_beside(
+    machine: Machine,
+    centre: MachineDiagnosis,
+    initial_states: int,
+    budget: int,
+    workers: int | None = None,
+    stops: Sequence[float] = (),
+) -> tuple[Attractors, tuple[tuple[float, Array], ...]]:
+    """The motions at a periodic centre, and the states carried along the speed at the ``stops`` beside it."""
+    carried = carried_states(machine, stops) if initial_states >= FEWEST_STARTS else None
+    found = attractors(
+        machine,
+        starts=initial_states if carried else 0,
+        budget=budget,
+        centre=centre,
+        carried=carried,
+        workers=workers,
     )
+    return found, carried.beside if carried else ()
+
+
+def coexisting(found: Attractors | None, centre: MachineDiagnosis) -> tuple[Coexisting, ...]:
+    """The motions that are not that of the centre; a neutral one is a family, whose force may be another."""
+    if found is None:
+        return ()
+    first = found.motions[:1] if found.motions[0].neutral else ()
+    return tuple(Coexisting(one.nature, one.largest_peak) for one in (*first, *found.motions[1:]))
 
 
 def define(

@@ -11,7 +11,7 @@ In numbers, for the point in the middle of its region:
 
     III           it is not periodic (case II; a quasiperiodic response is Type III by 5.5.2); or no straight cut
                   through the region parts the points that are periodic from those that are not (case III); or
-                  attractors that coexist in the middle have largest peaks more than 10 % apart
+                  a motion that coexists in the middle is not periodic, or its largest peak more than 10 % away
     II            otherwise, if some point of the region is not periodic, or has a largest peak more than 10 % higher
     I             the rest
     undetermined  if the point is
@@ -39,6 +39,13 @@ CROSS = ((0, 0), (-1, 0), (1, 0), (0, -1), (0, 1))
 """The smallest neighbourhood: a point and, in tolerances of speed and of clearance, the four beside it."""
 
 
+class Coexisting(NamedTuple):
+    """Another motion in the middle of the region, from another initial state."""
+
+    nature: str
+    largest_peak: float
+
+
 class Neighbour(NamedTuple):
     """A point of the region: its deviation in each parameter that deviates, in tolerances, and what it does."""
 
@@ -54,7 +61,7 @@ class Neighbour(NamedTuple):
 
 
 def judge_type(
-    nature: str, largest_peak: float, neighbours: Iterable[Neighbour], coexisting_peaks: Sequence[float] = ()
+    nature: str, largest_peak: float, neighbours: Iterable[Neighbour], coexisting: Sequence[Coexisting] = ()
 ) -> tuple[Type, str]:
     """Type of a response and its reason, from what it and the region around it do.
 
@@ -64,8 +71,8 @@ def judge_type(
         Of the point in the middle; the peak force in any unit.
     neighbours
         The other points of the region.
-    coexisting_peaks
-        Largest peaks in the middle from other initial states.
+    coexisting
+        The other motions in the middle.
 
     Examples
     --------
@@ -79,9 +86,11 @@ def judge_type(
         return "undetermined", "the nominal response is undetermined"
     if nature != "periodic":
         return "III", f"the nominal response is {nature}"
-    for peak in coexisting_peaks:
-        if apart(peak, largest_peak):
-            return "III", f"another initial state leads to {peak:.3g} N instead of {largest_peak:.3g} N"
+    for other in coexisting:
+        if other.nature != "periodic":
+            return "III", f"another initial state leads to a {other.nature} motion, up to {other.largest_peak:.3g} N"
+        if apart(other.largest_peak, largest_peak):
+            return "III", f"another initial state leads to {other.largest_peak:.3g} N instead of {largest_peak:.3g} N"
     restless = [point for point in points if point.nature != "periodic"]
     if restless:
         found = f"{len(restless)} of {len(points) + 1} points in the tolerances are not periodic"

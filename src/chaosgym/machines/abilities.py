@@ -88,6 +88,11 @@ class Abilities:
         """Its equations between contacts, if it is one of a few modes; its states are then q and q'."""
         return None
 
+    @property
+    def without_friction(self) -> Flexible | None:
+        """``flexible``, where friction is left out of the equations."""
+        return self.flexible
+
     def shape_of(self, place: str) -> Array:
         """Mode shapes (n,) at a named point, or of a motion between two, such as ``pinion - wheel``.
 

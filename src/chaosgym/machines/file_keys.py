@@ -30,6 +30,9 @@ TEXT = "text"
 AS_GIVEN = ("tolerances", "job")
 """Tables whose values are taken as they are: what they mean is known once the machine is."""
 
+INITIAL_STATE = Key("displacements, then velocities, of all coordinates in SI units; rest if left out", kind="row")
+"""Of the table "operation" of all files."""
+
 OPERATION: Mapping[str, Mapping[str, Key]] = {
     "tolerances": {"*": Key("half width of a field of the machine, with its unit or as a share in %")},
     "job": {"*": Key("number of the environments' task, as a keyword of gymnasium.make")},

@@ -7,9 +7,11 @@ from dataclasses import InitVar, dataclass
 from typing import TYPE_CHECKING, Any, ClassVar, NamedTuple, Self
 
 import numpy as np
+from numpy.typing import ArrayLike
 
 from chaosgym.arrays import Array
 from chaosgym.core.cycle import CycleArrays, cycle_arrays
+from chaosgym.errors import ParameterError
 from chaosgym.machines.abilities import Abilities
 from chaosgym.machines.integrators import ExactEvents, Integrator
 from chaosgym.machines.parameters import check_parameter, expand_fidelity, validate, with_settings
@@ -101,6 +103,9 @@ class Machine(Abilities, ABC):
     scenes: ClassVar[Mapping[str, Mapping[str, Any]]] = {"as it is": {}}
     """Scenes whose cost the trade-off shows: the fields in which they differ from the default."""
 
+    stated_state: ClassVar[tuple[float, ...]] = ()
+    """Initial state that its file states, in SI units; rest in the middle of the gap if empty."""
+
     tolerances: ClassVar[Mapping[str, tuple[float, bool]]] = {}
     """Half width of each field within which machines are built, and whether it is a share; usual ones if empty."""
     has_motor: ClassVar[bool] = False
@@ -119,6 +124,33 @@ class Machine(Abilities, ABC):
         for name, value in expand_fidelity(type(self), {"fidelity": fidelity}).items():
             object.__setattr__(self, name, value)
         validate(self)
+
+    @property
+    def initial_state(self) -> tuple[float, ...]:
+        """State from which it runs where no other is given (n_states,), in SI units; empty for rest."""
+        return self.__dict__.get("_initial_state", self.stated_state)
+
+    def from_state(self, state: ArrayLike) -> Self:
+        """Return the machine that runs from a state (n_states,) where no other is given; () for rest.
+
+        Raises
+        ------
+        ParameterError
+            If the state has another length, or a value is not finite.
+
+        Examples
+        --------
+        >>> beam = chaosgym.ImpactBeam(excitation_frequency=19.0)
+        >>> other = chaosgym.diagnosis.attractors(beam).motions[1]  # doctest: +SKIP
+        >>> chaosgym.diagnose(beam.from_state(other.state))  # doctest: +SKIP
+        """
+        values = np.asarray(state, dtype=float)
+        if values.shape not in ((0,), (self.n_states,)) or not np.all(np.isfinite(values)):
+            raise ParameterError(
+                f"initial_state has shape {values.shape}; allowed: ({self.n_states},), all values finite: "
+                "displacements, then velocities"
+            )
+        return self._with_unchecked(_initial_state=tuple(values.tolist()))
 
     @property
     def rung(self) -> str | None:

@@ -76,15 +76,15 @@ def _reduced(machine: Any) -> Any:
     values = {each.name: getattr(machine, each.name) for each in fields(machine)}
     # what is the file's own comes back with it
     own = {name: value for name, value in values.items() if value is not getattr(kind, name, None)}
-    return _restored, (machine.name, {**own, "definition": machine.definition})
+    return _restored, (machine.name, {**own, "definition": machine.definition}, machine.initial_state)
 
 
-def _restored(path: str, values: Mapping[str, Any]) -> Machine:
+def _restored(path: str, values: Mapping[str, Any], initial_state: tuple[float, ...]) -> Machine:
     kind: Any = machine_class(path)
     if kind.definition != values["definition"]:
         raise ParameterError(f"{path} has changed: it is not the machine that was kept")
     machine: Machine = kind(**values)
-    return machine
+    return machine.from_state(initial_state)
 
 
 def read_machine(path: str | Path) -> Machine:

@@ -166,7 +166,10 @@ def with_settings(machine: M, settings: Mapping[str, Any]) -> M:
     for name in settings:
         if name not in known:
             raise ParameterError(f"{type(machine).__name__} has no field {name!r}{suggestion(name, known)}")
-    return replace(machine, **settings)  # type: ignore[type-var]
+    made = replace(machine, **settings)  # type: ignore[type-var]
+    if "_initial_state" in vars(machine):
+        object.__setattr__(made, "_initial_state", vars(machine)["_initial_state"])
+    return made
 
 
 def changes_of(machine: Any) -> dict[str, Any]:

@@ -79,3 +79,14 @@ def flat(given: Mapping[str, Any]) -> dict[str, Any]:
         inner = flat(value) if isinstance(value, dict) else {"": value}
         found |= {f"{key}.{name}" if name else key: each for name, each in inner.items()}
     return found
+
+
+def state_of(operation: Mapping[str, Any], machine: Machine) -> tuple[float, ...]:
+    """Initial state that the table [operation] of a file states; empty for rest.
+
+    Raises
+    ------
+    ParameterError
+        If it has another length than the machine's states.
+    """
+    return machine.from_state(operation.get("initial_state", ())).initial_state

@@ -35,6 +35,9 @@ SQUARES = {
 }
 """Colour of each kind of square behind curves; "periodic" is one that is not proven."""
 
+SHADES = ("#79aec0", "#f0b9c0", "#c8dfb0", "#d9c6e0", "#f2d29b", "#a9cbd6", "#b7b0d8", "#e3b7a0")
+"""Colours of the branches in a picture of shares."""
+
 STYLES: dict[str, dict[str, Any]] = {
     "stable": {"color": ACCENT, "lw": 1.6},
     "unstable": {"color": BAD, "lw": 0.9, "ls": (0, (3, 2))},
@@ -65,6 +68,26 @@ def branches(diagram: BifurcationDiagram, ax: Axes) -> Axes:
     if heights:
         everything = np.concatenate(heights)
         ax.set_ylim(0.95 * float(everything.min()), 1.05 * float(everything.max()) or 1.0)
+    return ax
+
+
+def shares(diagram: BifurcationDiagram, ax: Axes) -> Axes:
+    """Shares of the random starts that settle on each branch along a field, and on motions without one, stacked."""
+    label, factor = axis_label(diagram.machine, diagram.field)
+    points = [point for point in diagram.sweep if point.motions]
+    numbers = sorted({one.branch for point in points for one in point.motions if one.branch is not None})
+    parts = np.array(
+        [
+            [sum(one.share for one in point.motions if one.branch == number) for point in points]
+            for number in [*numbers, None]
+        ]
+    )
+    names = [*(f"branch {number}" for number in numbers), "not periodic or not proven"]
+    there = [row for row in range(len(names)) if parts[row].any()]
+    colours = [SHADES[row % len(SHADES)] if row < len(numbers) else MUTED for row in there]
+    places = [factor * point.value for point in points]
+    ax.stackplot(places, parts[there], labels=[names[row] for row in there], colors=colours, lw=0.0)
+    ax.set(xlabel=label, ylabel="share of starts", xlim=(factor * diagram.low, factor * diagram.high), ylim=(0.0, 1.0))
     return ax
 
 

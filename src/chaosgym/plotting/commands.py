@@ -22,7 +22,7 @@ from chaosgym.diagnosis.verdict import MachineDiagnosis
 from chaosgym.fit.overlay import Overlay
 from chaosgym.machines import Machine
 from chaosgym.plotting import response
-from chaosgym.plotting.branches import bifurcation_map, branches
+from chaosgym.plotting.branches import bifurcation_map, branches, shares
 from chaosgym.plotting.design import cost_against_life, peak_record, series_life, type_map_around
 from chaosgym.plotting.labels import axis_label
 from chaosgym.plotting.style import ACCENT, INK, NATURE_COLOURS, STYLE, figure_of
@@ -285,9 +285,13 @@ def study_figure(study: DesignStudy) -> Figure:
 
 @_styled
 def branch_figure(diagram: BifurcationDiagram) -> Figure:
-    """Branches of periodic orbits along a field, with their bifurcations, over the peaks of a sweep."""
-    figure = figure_of(1.6 * WIDTH, 4.2)
-    ax = branches(diagram, figure.subplots())
+    """Branches of periodic orbits along a field, over the peaks of a sweep; below, the shares of random starts."""
+    shared = any(point.motions for point in diagram.sweep)
+    figure = figure_of(1.6 * WIDTH, 6.4 if shared else 4.2)
+    panels = figure.subplots(2, height_ratios=(2, 1)) if shared else [figure.subplots()]
+    ax = branches(diagram, panels[0])
+    if shared:
+        shares(diagram, panels[1]).legend(loc="upper left", bbox_to_anchor=(1.0, 1.0), fontsize=7)
     figure.legend(*ax.get_legend_handles_labels(), loc="outside lower center", ncols=5, fontsize=8)
     name = Path(diagram.machine.name).stem
     figure.suptitle(f"{name}: periodic orbits", **TITLE)

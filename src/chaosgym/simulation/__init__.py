@@ -2,7 +2,14 @@
 
 from chaosgym.machines.integrators import ExactEvents, Integrator, RungeKutta4
 from chaosgym.simulation.record import CycleRecord, MotionState
-from chaosgym.simulation.run import parallel_map, rest_state, simulate, simulate_many, simulate_with_deviations
+from chaosgym.simulation.run import (
+    begin_state,
+    parallel_map,
+    rest_state,
+    simulate,
+    simulate_many,
+    simulate_with_deviations,
+)
 
 __all__ = [
     "CycleRecord",
@@ -10,6 +17,7 @@ __all__ = [
     "Integrator",
     "MotionState",
     "RungeKutta4",
+    "begin_state",
     "parallel_map",
     "rest_state",
     "simulate",

@@ -105,10 +105,16 @@ def rest_state(machine: Machine) -> MotionState:
     return MotionState(np.zeros(machine.n_states), np.zeros(3 * max(1, len(machine.joints))))
 
 
-def _initial(machine: Machine, given: MotionState | ArrayLike | None) -> MotionState:
+def begin_state(machine: Machine) -> MotionState:
+    """Return the state from which a machine runs where no other is given: its own, or rest."""
     rest = rest_state(machine)
+    return rest._replace(coordinates=np.array(machine.initial_state)) if machine.initial_state else rest
+
+
+def _initial(machine: Machine, given: MotionState | ArrayLike | None) -> MotionState:
+    rest = begin_state(machine)
     if given is None:
-        return rest
+        given = rest
     state = given if isinstance(given, MotionState) else MotionState(np.array(given, dtype=float), rest.bouncing)
     if state.coordinates.shape != rest.coordinates.shape or not np.all(np.isfinite(state.coordinates)):
         raise ParameterError(
@@ -146,7 +152,8 @@ def simulate(
     cycles
         Number of cycles to record.
     initial_state
-        A ``MotionState``, an array (n_states,), or None for rest in the middle of the gap.
+        A ``MotionState``, an array (n_states,), or None for the machine's own, which is rest in the middle of the gap
+        unless it states another.
     transient
         Number of cycles to run first and not to record.
     samples_per_cycle

@@ -18,7 +18,7 @@ from chaosgym import files
 from chaosgym.errors import DatasetError
 from chaosgym.files import first_line, parquet_of
 from chaosgym.machines.parameters import parameters_of
-from chaosgym.sweeps.plan import SweepPlan
+from chaosgym.sweeps.plan import WITHOUT_SEARCH, SweepPlan
 
 WINDOW = 64
 """Cycles of a signal."""
@@ -141,6 +141,10 @@ def schema(plan: SweepPlan, settings: Mapping[str, Any]) -> pa.Schema:
     about_type = _NEIGHBOURS.format(fields=" and ".join(reach)) if reach else _FULL
     about_type = _CROSS if plan.sampling == "crosses" else about_type
     columns["response_type"] = LABELS["response_type"]._replace(meaning=about_type)
+    if plan.full_types and plan.initial_states != WITHOUT_SEARCH:
+        searched = f"all tolerances and from {plan.initial_states} random starts, by runs of its own"
+        searched = f"I, II, III or undetermined over {searched}"
+        columns["full_response_type"] = LABELS["full_response_type"]._replace(meaning=searched)
     if plan.signals:
         columns |= signal_columns()
     definitions = {name: column.meaning for name, column in columns.items() if name not in described}

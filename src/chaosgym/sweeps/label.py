@@ -115,9 +115,9 @@ def _signals(machine: Machine, record: CycleRecord) -> dict[str, Any]:
     }
 
 
-def _full_type(machine: Machine, budget: int) -> str | None:
+def _full_type(machine: Machine, plan: SweepPlan) -> str | None:
     try:
-        return response_type(machine, budget=budget, workers=1).type
+        return response_type(machine, budget=plan.budget, initial_states=plan.initial_states, workers=1).type
     except (DiagnosisError, ParameterError, SimulationError):
         return None
 
@@ -146,7 +146,7 @@ def label_rows(plan: SweepPlan, rows: range, stop: Event | None = None) -> pa.Ta
         if not with_signals[index]:
             label = {name: value for name, value in label.items() if name not in signals}
         if with_full_type[index]:
-            label["full_response_type"] = _full_type(machine, plan.budget)
+            label["full_response_type"] = _full_type(machine, plan)
         lines.append(fixed | point | label)
     if plan.sampling == "crosses":
         for line, number, part in zip(lines, plan.machine_numbers(rows), plan.splits(rows), strict=True):

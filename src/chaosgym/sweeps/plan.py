@@ -21,6 +21,8 @@ from scipy.stats import qmc
 
 from chaosgym.arrays import Array
 from chaosgym.diagnosis import default_tolerances
+from chaosgym.diagnosis.attractors import STARTS
+from chaosgym.diagnosis.response_type import check_initial_states
 from chaosgym.diagnosis.type_rule import CROSS
 from chaosgym.errors import ParameterError
 from chaosgym.machines import MACHINES, Machine
@@ -71,6 +73,8 @@ class SweepPlan:
     full_types
         Share of the points whose response type is judged over all tolerances too, by runs of its own; only points with
         all their neighbours where these are points of the sweep.
+    initial_states
+        Of these types, as of ``response_type``; 3 in plans that were written without it.
 
     Examples
     --------
@@ -88,6 +92,7 @@ class SweepPlan:
     budget: int = DEFAULT_BUDGET
     signals: float = 0.0
     full_types: float = 0.0
+    initial_states: int = STARTS
 
     def __post_init__(self) -> None:
         self._check_fields()
@@ -103,6 +108,7 @@ class SweepPlan:
             raise ParameterError(f"size = {self.size} is out of range; allowed: 1 to 1e9 points")
         if self.budget < 100:
             raise ParameterError(f"budget = {self.budget} cycles is out of range; allowed: 100 or more")
+        check_initial_states(self.initial_states)
         for name in ("signals", "full_types"):
             if not 0.0 <= getattr(self, name) <= 1.0:
                 raise ParameterError(f"{name} = {getattr(self, name):g} is out of range; allowed: a share of 0 to 1")
@@ -276,6 +282,8 @@ class SweepPlan:
     def settings(self) -> dict[str, Any]:
         """Everything that decides the rows of the sweep, as JSON values."""
         described = {name: getattr(self, name) for name in _PLAIN_FIELDS}
+        if not self.full_types or self.initial_states == WITHOUT_SEARCH:
+            del described["initial_states"]
         described["machine"] = self.machine.name
         described["base"] = {name: getattr(self.machine, name) for name in parameters_of(self.machine)}
         described["axes"] = [asdict(axis) for axis in self.axes]
@@ -286,14 +294,18 @@ class SweepPlan:
     def from_settings(cls, settings: dict[str, Any]) -> "SweepPlan":
         """Return the plan whose ``settings`` these are."""
         machine: Any = MACHINES[settings["machine"]]
+        unstated = WITHOUT_SEARCH if settings["full_types"] else STARTS
         return cls(
             machine(**settings["base"]),
             tuple(Axis(**axis) for axis in settings["axes"]),
-            **{name: settings[name] for name in _PLAIN_FIELDS},
+            **{name: {"initial_states": unstated, **settings}[name] for name in _PLAIN_FIELDS},
         )
 
 
-_PLAIN_FIELDS = ("sampling", "size", "seed", "budget", "signals", "full_types")
+_PLAIN_FIELDS = ("sampling", "size", "seed", "budget", "signals", "full_types", "initial_states")
+
+WITHOUT_SEARCH = 3
+"""Initial states of full types in plans whose settings do not state them."""
 
 
 def default_axes(machine: Machine, sampling: Sampling) -> tuple[Axis, ...]:

@@ -35,7 +35,7 @@ from chaosgym.machines.mechanism.mechanism import Mechanism
 from chaosgym.machines.mechanism.nominal import places, revolution_of
 from chaosgym.machines.mechanism.spatial import SpatialMechanism
 from chaosgym.machines.parameters import parameter
-from chaosgym.machines.stated import range_of, tolerances_of
+from chaosgym.machines.stated import range_of, state_of, tolerances_of
 from chaosgym.numbers import number
 
 STILL = 1e-6
@@ -281,6 +281,7 @@ def built(path: str, digest: str, data: Mapping[str, Any], _folder: Path) -> typ
     named = zip(("speed_range", "clearance_range"), fields, ends, strict=True)
     made.usual_ranges = {field: range_of(made, f"operation.{key}", field, given) for key, field, given in named}
     made.tolerances = tolerances_of(data["tolerances"], machine)
+    made.stated_state = state_of(operation, machine)
     made.task_defaults = TaskDefaults(task=data["job"])
     if motor is not None:
         _ = machine.crank  # what can't turn is refused here

@@ -113,6 +113,9 @@ KEYS = Keys(
         },
         "operation": {
             "speed": Key("of the crank, constant", "rpm"),
+            "initial_state": Key(
+                "displacements, then velocities, of all coordinates in SI units; rest if left out", "-", "row"
+            ),
             "speed_range": Key("lowest and highest", "rpm", "row"),
             "clearance_range": Key("lowest and highest, of the monitored joint", "m", "row"),
             "monitored": Key("joint that is recorded; the first with clearance by default", kind=TEXT),

@@ -22,7 +22,7 @@ from chaosgym.machines.modal_machine.structure import BASE, Structure
 from chaosgym.machines.modal_machine.turning import turning_joints
 from chaosgym.machines.modal_machine.varying import Spring, VaryingMachine, checked_samples
 from chaosgym.machines.parameters import described_as, parameter, parameters_of
-from chaosgym.machines.stated import class_with, range_of, tolerances_of
+from chaosgym.machines.stated import class_with, range_of, state_of, tolerances_of
 from chaosgym.units import TURNING
 
 SAMPLED = ("drive", "joint", "spring")
@@ -129,6 +129,7 @@ def built(path: str, digest: str, data: Mapping[str, Any], folder: Path) -> type
             raise ParameterError("operation.monitored needs several [[joint]]; allowed with one: leave it out")
         made = _with_one_joint(structure, data["joint"][0], drives, springs, speed, usual, types, definition, path)
     made.tolerances = tolerances_of(data["tolerances"], made())
+    made.stated_state = state_of(operation, made())
     made.task_defaults = TaskDefaults(task={**made.task_defaults.task, **data["job"]})
     kind: type[Machine] = made
     return kind

@@ -171,10 +171,10 @@ class JointedMachine(Machine):
     @property
     def flexible(self) -> Flexible | None:
         """Its equations between contacts; None with friction, which acts beside the forces of the joints."""
-        return None if self.rubbing else self.equations
+        return None if self.rubbing else self.without_friction
 
     @property
-    def equations(self) -> Flexible:
+    def without_friction(self) -> Flexible:
         """The structure's equations between contacts, without friction."""
         return Flexible(self.sets.stiffness, self.sets.damping, self.sets.shape, *self._drive())
 

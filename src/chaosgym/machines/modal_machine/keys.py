@@ -81,6 +81,9 @@ TABLES: Mapping[str, Mapping[str, Key]] = {
     },
     "operation": {
         "speed": Key("operating cycles a second", "Hz"),
+        "initial_state": Key(
+            "displacements, then velocities, of all coordinates in SI units; rest if left out", "-", "row"
+        ),
         "speed_range": Key("lowest and highest", "Hz", "row"),
         "clearance_range": Key("lowest and highest, of the monitored or the first joint", "m", "row"),
         "monitored": Key("joint that is shown and judged; if open, the one with the largest force", kind=TEXT),
