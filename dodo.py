@@ -85,7 +85,7 @@ TASKS = ["src/chaosgym/envs/levels.py", "src/chaosgym/envs/judge.py"]
 TASKS += sorted(map(str, Path("src/chaosgym/machines").glob("*/task_defaults.py")))
 """What says how machines are used in the environments, and when they cost."""
 
-RECIPES = "src/chaosgym/sweeps/datasets.toml"
+RECIPES = "datasets/datasets.toml"
 DATASETS = tuple(tomllib.loads(Path(RECIPES).read_text()))
 """Machines whose datasets are made; the options stand in ``RECIPES``."""
 
@@ -168,7 +168,7 @@ def task_dataset():
     """Labelled crosses of independent machines; a sample of them is kept."""
     for machine in DATASETS:
         run = f"{RUNS}/{machine}"
-        build = f"chaosgym dataset build {machine} --no-check --out {run}"
+        build = f"python -m benchmarks build-dataset {machine} --no-check --out {run}"
         made = [*kept(machine), f"datasets/{machine}/CARD.md"]
         yield task(machine, [RECIPES], made, build, f"python -m benchmarks ship-dataset {run}")
 
@@ -178,7 +178,7 @@ def task_classifier():
     for machine in DATASETS:
         used = [*kept(machine), *sources("src/chaosgym/classifier")]
         made, run, data = f"src/chaosgym/weights/{machine}.npz", f"{RUNS}/classifier-{machine}", whole(machine)
-        build = f"chaosgym dataset build {machine} --out {data}"
+        build = f"python -m benchmarks build-dataset {machine} --out {data}"
         train = f"chaosgym train-classifier --data {data} --out {run}"
         yield task(machine, used, [made], build, f"rm -rf {run}", train, f"cp {run}/*.npz {made}")
 
@@ -187,7 +187,7 @@ def task_signs():
     """How often the signs of chaos of thesis 5.3 were right on the whole datasets."""
     used = [file for machine in DATASETS for file in kept(machine)]
     used += ["src/chaosgym/diagnosis/precursors.py", "benchmarks/sweeps/signs.py"]
-    builds = [f"chaosgym dataset build {machine} --out {whole(machine)}" for machine in DATASETS]
+    builds = [f"python -m benchmarks build-dataset {machine} --out {whole(machine)}" for machine in DATASETS]
     count = "python -m benchmarks.sweeps.signs " + " ".join(map(whole, DATASETS))
     yield task("rates", used, ["src/chaosgym/diagnosis/signs.json"], *builds, count)
 
@@ -225,7 +225,7 @@ def task_jobs():
     """Jobs of the fleet's beams in Exudyn; the same command without ``rm`` goes on with a file of fewer."""
     made = "docs/data/other-simulator.jsonl"
     used = TASKS + sources("src/chaosgym/control/controllers") + [f"{SHIPPED}/ImpactBeamTolerance-v1-fleet/weights.npz"]
-    used += ["benchmarks/envs/other_simulator.py", "src/chaosgym/machines/impact_beam/exudyn_beam.py"]
+    used += ["benchmarks/envs/other_simulator.py", "src/chaosgym/envs/exudyn_beam.py"]
     yield task("other-simulator", used, [made], f"rm -f {made}", "python -m benchmarks other-simulator")
 
 
@@ -266,22 +266,27 @@ def task_picture():
     draw = f"python -m benchmarks curves --table {curves} --figure {drawn}"
     yield task("training", [curves, "benchmarks/envs/curves.py"], [drawn], draw)
     for machine in DATASETS:
-        for kind, options in (("tradeoff", LADDER_OPTIONS[machine]), ("stability", "")):
-            folder = "docs/development" if kind == "stability" else "docs"
+        for kind, program, options, folder, own in (
+            ("tradeoff", "chaosgym", LADDER_OPTIONS[machine], "docs", "src/chaosgym/fidelity"),
+            ("stability", "python -m benchmarks", "", "docs/development", "benchmarks/fidelity"),
+        ):
             made, run = f"{folder}/{kind}-{machine}.png", f"{RUNS}/{kind}-{machine}"
-            measure = f"chaosgym {kind} {machine} {options} --out {run}"
+            measure = f"{program} {kind} {machine} {options} --out {run}"
             copy = f"cp {run}/{kind}.png {made}"
             rungs = f"src/chaosgym/machines/{machine.replace('-', '_')}/parameters.py"
-            used = [rungs, *sources("src/chaosgym/fidelity")]
+            used = [rungs, *sources(own)]
             yield task(f"{kind}-{machine}", used, [made], f"mkdir -p {run}", measure, copy)
 
 
 def task_sample():
-    """The recording and the measured sweep that the documentation judges."""
+    """The recordings and the measured sweep that the documentation judges."""
     swept = "docs/data/sweep.csv"
     used = ["benchmarks/documentation/swept_peaks.py", "thesis/scorecard/candidates.json"]
     yield task("sweep", used, [swept], f"python -m benchmarks.documentation.swept_peaks {swept}")
     point = "--frequency-hz '30 Hz' --clearance-mm '0.127 mm' --cycles 1000 --transient 200"
+    decided = ["docs/data/periodic.csv", "docs/data/chaotic.csv"]
+    used = ["benchmarks/documentation/sample_recordings.py", "docs/machines/shaw-holmes-1983.toml"]
+    yield task("decided", used, decided, "python -m benchmarks.documentation.sample_recordings docs/data")
     made = "docs/data/peaks.csv"
     run = f"chaosgym simulate impact-beam {point} --out {made}"
     yield task("peaks", [], [made], f"rm -f {made}", run)

@@ -81,7 +81,7 @@ def arguments() -> argparse.Namespace:
 
 
 class Jobs(NamedTuple):
-    """Jobs of n machines: ``seen`` (steps, n, 14) and share ``irregular`` (steps, n), nan at the start and the end."""
+    """Jobs of n machines: ``seen`` (steps, n, entries), share ``irregular`` (steps, n), nan at both ends."""
 
     seen: Array
     irregular: Array

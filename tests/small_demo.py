@@ -1,4 +1,4 @@
-"""The demo with a smaller sweep and a shorter training: ``python tests/small_demo.py demo`` and its options."""
+"""The demo with a smaller sweep and fewer machines: ``python tests/small_demo.py demo`` and its options."""
 
 from chaosgym import demo
 from chaosgym.cli import main
@@ -9,7 +9,7 @@ SMALL = {
     "TRAINING_STEPS": 3840,
     "MACHINES": 2,
 }
-"""What becomes of the constants of the demo; the agent learns once from 60 steps of each of 64 machines."""
+"""What becomes of the constants of the demo; ``--train`` learns once from 60 steps of each of 64 machines."""
 
 if __name__ == "__main__":
     vars(demo).update(SMALL)

@@ -25,7 +25,7 @@ from chaosgym.machines.machine_file import machine_class, template
 from chaosgym.machines.modal_machine.archives import read_archive, read_matrix
 from chaosgym.recordings.read import read_recording
 from chaosgym.sweeps import read_sweep
-from chaosgym.sweeps.card import dataset_info
+from chaosgym.sweeps.info import dataset_info
 
 HERE = Path(__file__).parents[1]
 

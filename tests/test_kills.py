@@ -104,14 +104,13 @@ def _pipeline(out):
     program = (
         "import sys; from subprocess import run; c = [sys.executable, '-m', 'chaosgym'];"
         f"run([*c, 'sweep', *'{CROSSES}'.split(), '--out', '{out}/data'], check=True);"
-        f"run([*c, 'dataset', 'card', '{out}/data'], check=True)"
+        f"run([*c, 'dataset', 'map', '{out}/data', '--out', '{out}/map.png'], check=True)"
     )
     return ["-c", program]
 
 
 def _dataset(out):
-    card = (out / "data" / "CARD.md").read_text().replace(str(out), "OUT")
-    return pq.read_table(out / "data" / "sweep.parquet").to_pylist(), card
+    return pq.read_table(out / "data" / "sweep.parquet").to_pylist(), (out / "map.png").read_bytes()
 
 
 def _commands(*commands, unless):
@@ -173,7 +172,7 @@ WORK = {
     "a dataset of Minari": (_minari, _jobs_of_minari),
     "a calibration": (_calibration, _constants),
     "an evaluation": (_comparison, _jobs),
-    "a dataset with its card": (_pipeline, _dataset),
+    "a dataset with its map": (_pipeline, _dataset),
 }
 
 

@@ -7,8 +7,9 @@ from typing import Any, ClassVar
 
 import numpy as np
 
+from chaosgym.machines.flexible_model import Modes, flexible_model
 from chaosgym.machines.machine import Number, Option
-from chaosgym.machines.modal_impact import ModalImpactMachine, Modes, flexible_model
+from chaosgym.machines.modal_impact import ModalImpactMachine
 from chaosgym.machines.parameters import parameter
 
 
@@ -21,7 +22,6 @@ class ImpactOscillator(ModalImpactMachine):
     clearance_field: ClassVar[str] = "gap"
     usual_ranges: ClassVar[Mapping[str, tuple[float, float]]] = {"frequency": (4.0, 12.0), "gap": (1e-4, 2e-3)}
     options: ClassVar[Mapping[str, Option]] = {"--gap-mm": Number("gap", "mm", 1e-3)}
-    extremes: ClassVar[Mapping[str, Mapping[str, Any]]] = {"gap 0": {"gap": 0.0}}
 
     frequency: float = parameter(8.0, unit="Hz", low=0.1, high=100.0, provenance="assumed", source="this test")
     gap: float = parameter(1e-3, unit="m", low=0.0, high=0.1, provenance="assumed", source="this test")

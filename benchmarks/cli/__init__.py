@@ -6,7 +6,10 @@ from typing import Any
 import click
 
 from benchmarks.cli.bench import bench
+from benchmarks.cli.datasets import build_dataset
 from benchmarks.cli.environments import COMMANDS
+from benchmarks.cli.fidelity import stability
+from benchmarks.cli.house import house
 from chaosgym.cli import run_command
 from chaosgym.cli.machine_options import machine_command
 from chaosgym.cli.output import AS_JSON, emit
@@ -184,7 +187,23 @@ def app() -> None:
     """Numbers about chaosgym itself."""
 
 
-for command in (bench, agreement, margins, learned, check, ship, types, cost, classifier, monitors, general, exponents):
+for command in (
+    bench,
+    house,
+    agreement,
+    margins,
+    learned,
+    check,
+    build_dataset,
+    ship,
+    types,
+    cost,
+    classifier,
+    monitors,
+    general,
+    exponents,
+    stability,
+):
     app.add_command(command)
 for command in COMMANDS:
     app.add_command(command)

@@ -12,9 +12,11 @@ import gymnasium as gym
 
 from chaosgym.envs import ENVIRONMENTS
 from chaosgym.envs.drive import MOVES
+from chaosgym.envs.entries import keywords_of
 from chaosgym.envs.judge import ExponentJudge
 from chaosgym.envs.levels import LEVELS, task_of, tolerances_of
 from chaosgym.envs.observation import MEANINGS
+from chaosgym.envs.task import Task
 from chaosgym.machines.parameters import parameters_of
 
 KINDS = {
@@ -93,8 +95,9 @@ def common(rows: list[str], known: dict[str, Any]) -> str:
         sensor=task.sensor_error,
         bouncing=task.bouncing_error,
         missed=task.missed_impacts,
-        life=task.life_share,
+        life=task.reference_damage,
         observations=_table(f"Num | Observation | {columns}", _observations(list(known.values()))),
+        added=_table(f"Keyword | Observation | {columns}", _added([env.task for env in known.values()])),
         rewards=_table(f"Term | Value | w, {columns.replace('| ', '| w, ')}", weights),
         arguments=_table(f"Parameter | {columns} | Description", _arguments([env.task for env in known.values()])),
     )
@@ -182,10 +185,19 @@ def _observations(environments: list[Any]) -> list[str]:
     ]
 
 
+def _added(tasks: list[Any]) -> list[str]:
+    """Rows of the entries that keywords add."""
+    return [
+        " | ".join([f'`{keyword}="{value}"` | `{entry.name}`: {entry.meaning}', *map("{:g} to {:g}".format, *bounds)])
+        for keyword, (value, entry) in keywords_of(Task).items()
+        for bounds in [zip(*map(entry.bounds, tasks), strict=True)]
+    ]
+
+
 def _arguments(tasks: list[Any]) -> list[str]:
     """Rows of the keywords; what all tasks have alike stands in the first column alone."""
-    rows = []
-    for name, about in parameters_of(tasks[0]).items():
+    rows, added = [], keywords_of(Task)
+    for name, about in sorted(parameters_of(Task).items(), key=lambda item: item[0] in added):
         values = [getattr(task, name) for task in tasks]
         shown = [f"`{value}`" if isinstance(value, str) else f"`{value:g}`" for value in values]
         unit = f" [{about.unit}]" if about.unit != "-" else ""

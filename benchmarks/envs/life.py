@@ -1,8 +1,8 @@
 """What does kriging win of the joint's life, on machines of which nobody has a model? All sets are untouched by tuning.
 
 The score is 0 for following the demand and 1 for the own map, by returns under ``objective="life"``; a machine is made
-worse if its job costs 1 % more than under following. Where a file states no load rating, it is set so that following
-uses up 0.28 of a life in a job, as on the beam, and the sensor's error is as large beside it.
+worse if its job costs 1 % more than under following. The reference force of a file is set so that following
+has a damage of 0.28 in a job, as on the beam, and the sensor's error is as large beside it.
 """
 
 from collections.abc import Iterable, Mapping
@@ -29,11 +29,13 @@ MADE_WORSE = 0.01
 
 
 def _rated(path: str, machines: int) -> dict[str, Any]:
-    """Keywords of a file's task whose following uses up as much of a life as on the beam."""
+    """Keywords of a file's task whose following has as much damage as on the beam."""
     far = 1e9
-    damage = play(Follow(), path, range(machines), objective="life", load_rating=far, sensor_error=0.0).damage.mean()
+    damage = play(
+        Follow(), path, range(machines), objective="life", reference_force=far, sensor_error=0.0
+    ).damage.mean()
     rated = far * (damage / FOLLOWING) ** (1.0 / LIFE_EXPONENT)
-    return {"load_rating": float(rated), "sensor_error": 0.0125 * float(rated)}
+    return {"reference_force": float(rated), "sensor_error": 0.0125 * float(rated)}
 
 
 def sets(machines: int, folder: Path) -> Mapping[str, tuple[str, list[int], dict[str, Any]]]:

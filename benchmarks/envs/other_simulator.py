@@ -21,6 +21,7 @@ from chaosgym.control.plant import work
 from chaosgym.control.policies import shipped_policy
 from chaosgym.control.scores import MADE_WORSE, difference
 from chaosgym.control.statistics import paired_difference
+from chaosgym.envs.exudyn_beam import ExudynBatch
 from chaosgym.envs.judge import ExponentJudge
 from chaosgym.envs.task import Task
 from chaosgym.envs.vector_env import native_envs
@@ -46,7 +47,7 @@ PLAYERS: Mapping[str, tuple[Any, str]] = {
 ONE = np.zeros(1, np.int64)
 
 
-SIMULATORS: Mapping[str, Any] = {"chaosgym": ImpactBeam.batch, "Exudyn": ImpactBeam.exudyn_batch}
+SIMULATORS: Mapping[str, Any] = {"chaosgym": ImpactBeam.batch, "Exudyn": ExudynBatch}
 """What makes beams in each."""
 
 
@@ -63,7 +64,7 @@ class Rig:
     Attributes
     ----------
     irregular, damage
-        Share of irregular cycles of each step, and share of its life that the joint used up, by true forces.
+        Share of irregular cycles of each step, and damage of the joint, by true forces.
     """
 
     def __init__(self, kind: Any, machine: ImpactBeam, task: Task, seed: int) -> None:

@@ -30,7 +30,7 @@ SETTLING, JUDGED, TOGETHER = 20, 20, 64
 """Cycles at a speed before forces count and while they do, and machines side by side."""
 
 FOLLOWING = 0.28
-"""Share of a life that a job of who follows the demand uses up, as on the beam."""
+"""Damage of a job of who follows the demand, as on the beam."""
 
 CONTACT, LEAST_GAIN = 0.9, 0.05
 
@@ -56,7 +56,10 @@ def gain_of(load: Array) -> float:
     """Share of what following costs that the best speeds within reach save; ``load`` (s,) over that of rated force."""
     task = pool_task()
     price = (
-        LIFE_PRICE * task.life_share / task.steps / (task.deviation_weight * (task.highest_speed - task.lowest_speed))
+        LIFE_PRICE
+        * task.reference_damage
+        / task.steps
+        / (task.deviation_weight * (task.highest_speed - task.lowest_speed))
     )
     grid = task.grid
     demands = np.flatnonzero(grid > task.lowest_demand - 1e-9)
@@ -81,7 +84,7 @@ def kept_machines(kinds: tuple[str, ...]) -> Iterator[tuple[str, int, float]]:
             if bad or (felt.max(axis=1) > 0.0).mean() < CONTACT:
                 continue
             usual = felt[demands].mean(axis=0).max()
-            rated = (usual * task.life_share / FOLLOWING) ** (1.0 / LIFE_EXPONENT)
+            rated = (usual * task.reference_damage / FOLLOWING) ** (1.0 / LIFE_EXPONENT)
             if gain_of(felt.max(axis=1) / rated**LIFE_EXPONENT) >= LEAST_GAIN:
                 yield kind, number, float(f"{rated:.6g}")
 

@@ -18,8 +18,8 @@ from benchmarks.performance.exudyn_machines import ExudynSetting, run_in_exudyn
 from benchmarks.performance.timing import processor_seconds
 from chaosgym import read_machine
 from chaosgym.arrays import Array
+from chaosgym.envs.exudyn_beam import load_exudyn
 from chaosgym.machines import ImpactBeam, Machine, SliderCrank
-from chaosgym.machines.impact_beam.exudyn_beam import load_exudyn
 from chaosgym.machines.integrators import Integrator
 from chaosgym.machines.mechanism.machine import MechanismMachine
 from chaosgym.machines.parameters import with_settings

@@ -1,6 +1,6 @@
 """The same machines in Exudyn, the best general simulator for them, driven as its manual advises.
 
-The impact beam is that of ``chaosgym.machines.impact_beam.exudyn_beam``: both integrate the same equations. A mechanism
+The impact beam is that of ``chaosgym.envs.exudyn_beam``: both integrate the same equations. A mechanism
 of rigid links has the same bodies, joints and contact law, and turns by any angle: its equations are Exudyn's own. The
 slider crank is what an Exudyn user would build of the same parts: geometrically exact beam elements whose end nodes
 carry housing and yoke, a flywheel so heavy that it turns at constant speed, a slider.
@@ -17,8 +17,8 @@ import numpy as np
 
 from benchmarks.performance.timing import processor_seconds
 from chaosgym.arrays import Array
+from chaosgym.envs.exudyn_beam import add_beam, add_stops, load_exudyn, settings_of
 from chaosgym.machines.impact_beam import ImpactBeam
-from chaosgym.machines.impact_beam.exudyn_beam import add_beam, add_stops, load_exudyn, settings_of
 from chaosgym.machines.machine import Machine
 from chaosgym.machines.mechanism.joints import GROUND
 from chaosgym.machines.mechanism.machine import MechanismMachine

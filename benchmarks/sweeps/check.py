@@ -5,8 +5,8 @@ import random
 import pyarrow as pa
 from tqdm import tqdm
 
+from benchmarks.sweeps.agreement import Agreement, agreement
 from chaosgym.errors import DatasetError
-from chaosgym.sweeps.agreement import Agreement, agreement
 from chaosgym.sweeps.dataset import LabelledSweep
 from chaosgym.sweeps.label import provenance
 from chaosgym.sweeps.run import relabel

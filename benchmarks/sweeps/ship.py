@@ -7,9 +7,9 @@ predecessors.
 import shutil
 from pathlib import Path
 
+from benchmarks.sweeps.build import SAMPLE, WHOLE, drawn_digest, settings_digest, write_sample
+from benchmarks.sweeps.card import CARD_FILE, dataset_card
 from chaosgym.files import write_atomically
-from chaosgym.sweeps.build import SAMPLE, WHOLE, drawn_digest, settings_digest, write_sample
-from chaosgym.sweeps.card import CARD_FILE, dataset_card
 from chaosgym.sweeps.dataset import LabelledSweep, read_sweep
 from chaosgym.sweeps.folder import PLAN_FILE
 
@@ -35,6 +35,6 @@ def _about_sample(whole: LabelledSweep, file: Path) -> str:
     return (
         f"This card describes the whole. Git keeps the first {part.size:,} of its {plan.size:,} crosses, "
         f"`{SAMPLE}/{file.name}`, with the signals of {part.signals:.0%} of the rows. "
-        f"`chaosgym dataset build {plan.machine.name}` makes the whole and compares it with the sample. Digest of "
-        f"settings {settings_digest(plan)}, of drawn machines {drawn_digest(plan)}."
+        f"`python -m benchmarks build-dataset {plan.machine.name}` makes the whole and compares it with the sample. "
+        f"Digest of settings {settings_digest(plan)}, of drawn machines {drawn_digest(plan)}."
     )

@@ -116,8 +116,8 @@ for clearance in (0.02, 0.05, 0.1, 0.2):
 # %% [markdown]
 # ## Does the bush last?
 #
-# `chaosgym design --template compressor.toml > brief.toml` writes a commented brief. State your own criteria there; its
-# numbers are examples. This one asks for ten years of eight hours a day.
+# `chaosgym design --template compressor.toml > brief.toml` writes a commented brief. State your own criteria there:
+# what is not stated is not judged. This one asks for ten years of eight hours a day.
 
 # %%
 with open("brief.toml", "w", encoding="utf-8") as file:
@@ -137,7 +137,9 @@ load_rating = "25 kN"     # of the bush, for a million cycles
 life = "10 years"
 reliability = 0.99
 contact_radius = "80 mm"  # of the pin in its bush: 1 / (1 / r - 1 / R)
+contact_modulus = "115 GPa"  # steel on steel
 strength = "1.6 GPa"
+strength_deviation = "0.1 GPa"
 
 [changes]                 # to try, if it fails
 wrist_clearance = ["0.015 mm", "0.01 mm"]

@@ -22,7 +22,8 @@ if TYPE_CHECKING:
     from chaosgym.diagnosis.step_check import step_check
     from chaosgym.errors import ChaosgymError, ParameterError, SimulationError
     from chaosgym.machines import THESIS_SLIDER_CRANK, ImpactBeam, SliderCrank
-    from chaosgym.machines.modal_machine import Drive, Joint, ModalMachine, Structure, machine_with_joints, read_machine
+    from chaosgym.machines.machine_file import read_machine
+    from chaosgym.machines.modal_machine import Drive, Joint, ModalMachine, Structure, machine_with_joints
     from chaosgym.recordings.judge import judge_peaks
     from chaosgym.recordings.monitor import Monitor
     from chaosgym.recordings.read import read_recording
@@ -40,13 +41,13 @@ _HOME = {
     "chaosgym.diagnosis.step_check": ("step_check",),
     "chaosgym.errors": ("ChaosgymError", "ParameterError", "SimulationError"),
     "chaosgym.machines": ("THESIS_SLIDER_CRANK", "ImpactBeam", "SliderCrank"),
+    "chaosgym.machines.machine_file": ("read_machine",),
     "chaosgym.machines.modal_machine": (
         "Drive",
         "Joint",
         "ModalMachine",
         "Structure",
         "machine_with_joints",
-        "read_machine",
     ),
     "chaosgym.recordings.monitor": ("Monitor",),
     "chaosgym.recordings.read": ("read_recording",),

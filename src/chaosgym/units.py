@@ -193,6 +193,21 @@ def parse_option(name: str, text: str, unit: str, bare: str) -> float:
     return parse_quantity(name, f"{value!r} {written or bare}", unit) if written or bare else value
 
 
+def duration(seconds: float, digits: int = 4) -> str:
+    """A time for people, in the unit that needs no exponent: ``50 ms``, ``2 min``, ``13.89 h``.
+
+    Examples
+    --------
+    >>> from chaosgym.units import duration
+    >>> duration(0.05), duration(50_000.0), duration(3e-7)
+    ('50 ms', '13.89 h', '300 ns')
+    """
+    sizes = {"h": 7200.0, "min": 120.0, "s": 1.0, "ms": 1e-3, "µs": 1e-6, "ns": 0.0}
+    unit = next((name for name, least in sizes.items() if seconds >= least * (1.0 - 1e-9)), "ns")
+    size = {"h": 3600.0, "min": 60.0, "s": 1.0, "ms": 1e-3, "µs": 1e-6, "ns": 1e-9}[unit]
+    return f"{seconds / size:.{digits}g} {unit}"
+
+
 LOOKS_SCALED = (100.0, 10_000.0)
 """Multiples of a machine's usual length between which a bare number in metres was probably meant in millimetres."""
 

@@ -23,8 +23,8 @@ from benchmarks.performance.peers import peers
 from benchmarks.performance.timing import processor_seconds, rate
 from benchmarks.performance.waits import waits
 from chaosgym import read_machine
+from chaosgym.envs.exudyn_beam import load_exudyn
 from chaosgym.errors import ChaosgymError
-from chaosgym.machines.impact_beam.exudyn_beam import load_exudyn
 from chaosgym.simulation import simulate
 from tests.plain_modes import PLAIN_BEAM, PLAIN_CRANK
 

@@ -18,9 +18,12 @@ SOFT_FILE = (
 
 
 def test_without_a_gap_motions_change_at_the_same_speed_whatever_the_force():
-    """A stop at the place of rest leaves the equations homogeneous: twice the force is twice the motion."""
-    found = bifurcation_map(SOFT, "speed", "drive_level", (0.38, 0.42), (0.8, 1.6), columns=5, rows=3, workers=1)
-    assert found.nature.shape == found.period.shape == (5, 3)
+    """A stop at the place of rest leaves the equations homogeneous: twice the force is twice the motion.
+
+    Exactly so: a number twice as large is rounded alike, so both rows tell the same also of chaos near a window.
+    """
+    found = bifurcation_map(SOFT, "speed", "drive_level", (0.38, 0.42), (0.8, 1.6), columns=5, rows=2, workers=1)
+    assert found.nature.shape == found.period.shape == (5, 2)
     assert np.all(found.nature == found.nature[:, :1])
     assert np.all(found.period == found.period[:, :1])
     flips = [curve for curve in found.curves if curve.kind == "flip"]

@@ -14,7 +14,7 @@ from chaosgym.diagnosis.proof import returning_period
 from chaosgym.diagnosis.type_rule import type_of_cross
 from chaosgym.errors import ModelFileError
 from chaosgym.machines import ImpactBeam
-from chaosgym.machines.modal_machine import read_machine
+from chaosgym.machines.machine_file import read_machine
 from tests.classifier.made_up import settled
 from tests.plain_modes import PLAIN_CRANK
 

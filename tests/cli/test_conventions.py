@@ -29,7 +29,7 @@ def every_command(group, path=()):
 def test_every_command_gives_json():
     """Each has --json."""
     commands = dict(every_command(app))
-    assert {"dataset card", "dataset map", "explore", "simulate"} <= set(commands)
+    assert {"dataset info", "dataset map", "explore", "simulate"} <= set(commands)
     without = [name for name, command in commands.items() if "as_json" not in {p.name for p in command.params}]
     assert without == []
 

@@ -14,7 +14,7 @@ from chaosgym.control.policies import load_policy
 from chaosgym.errors import DatasetError, ModelFileError
 from chaosgym.files import unpacked
 from chaosgym.sweeps import read_sweep
-from chaosgym.sweeps.card import dataset_info
+from chaosgym.sweeps.info import dataset_info
 from tests.cli.run import run
 
 DATASET = Path(__file__).parents[2] / "datasets" / "impact-beam" / "sample"

@@ -435,9 +435,9 @@ def test_a_recording_that_takes_long_shows_a_sign_of_life(tmp_path, monkeypatch)
     """The reader says after a while that it goes on."""
     from chaosgym.recordings import read
 
-    def slow(source, found=read.read_recording):
+    def slow(source, found=read.read_recording, **where):
         time.sleep(1.0)
-        return found(source)
+        return found(source, **where)
 
     monkeypatch.setattr("chaosgym.cli.output.PATIENCE_SECONDS", 0.01)
     monkeypatch.setattr(read, "read_recording", slow)

@@ -8,7 +8,7 @@ from stable_baselines3 import PPO
 
 import chaosgym
 from chaosgym.control import comparison
-from chaosgym.control.comparison import IN_UNITS, compare, joined, read_comparison
+from chaosgym.control.comparison import LOAD, compare, joined, read_comparison
 from chaosgym.control.controllers import BackOff, Follow
 from chaosgym.control.evaluation import policy_of
 from chaosgym.control.maps import model_keywords
@@ -44,24 +44,21 @@ def test_following_scores_0_and_the_own_map_1(table):
     assert all(row["against_back_off"] is None for row in summary.values())  # with memory, which has not played
 
 
-def test_what_is_won_is_told_in_hours_and_newtons(table):
-    """Life is the job's time over its damage; the constant force of the same life follows from it."""
+def test_what_is_won_is_told_in_newtons_and_ratios_of_life(table):
+    """The constant force of the same damage follows from it; no hours, for which nobody stated a load rating."""
     played = play(BackOff(remembers=False), BEAM, range(4))
     row = Scores(table[0]).row("back off")
-    hours = (played.cycles_per_step / played.speed).sum(axis=0) / 3600.0
-    assert row["life_h"] == pytest.approx(np.prod(hours / played.damage) ** (1 / 4))
     task = native_envs(BEAM).task
-    steady = 95.0 * (played.damage / task.life_share) ** (1 / LIFE_EXPONENT)
+    steady = 95.0 * (played.damage / task.reference_damage) ** (1 / LIFE_EXPONENT)
     assert row["equivalent_force_N"] == pytest.approx(np.prod(steady) ** (1 / 4))
-    assert f"{row['life_h']:.3g} h, x{row['life']:.2f}" in table_lines({"back off": row})[-1]
+    assert f"| x{row['life']:.2f} |" in table_lines({"back off": row})[-1]
 
 
 def test_jobs_of_an_earlier_version_have_ratios_alone(table):
-    """A file without hours goes on, and no mean is taken over a part of its machines."""
-    earlier = table[0].filter(pa.compute.less(table[0]["machine"], 2)).drop_columns(list(IN_UNITS))
+    """A file without forces goes on, and no mean is taken over a part of its machines."""
+    earlier = table[0].filter(pa.compute.less(table[0]["machine"], 2)).drop_columns([LOAD])
     for found in (earlier, joined(earlier, table[0].filter(pa.compute.greater(table[0]["machine"], 1)))):
         row = Scores(found).row("back off")
-        assert row["life_h"] is None
         assert row["equivalent_force_N"] is None
         assert f"| x{row['life']:.2f} |" in table_lines({"back off": row})[-1]
 

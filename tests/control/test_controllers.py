@@ -20,6 +20,7 @@ from chaosgym.control.controllers import (
 from chaosgym.control.controllers.planned import best_schedule
 from chaosgym.control.maps import Maps, maps_of
 from chaosgym.control.rollout import play
+from chaosgym.envs.kernels.steps import PLACE
 from chaosgym.envs.vector_env import native_envs
 
 BEAM = "chaosgym/ImpactBeamTolerance-v1"
@@ -77,15 +78,15 @@ def test_the_best_felt_speed_is_one_that_was_felt():
     for _ in range(envs.task.steps):
         speeds = player(observations)[:, 0]
         for job, (wanted, row) in enumerate(zip(speeds.tolist(), observations, strict=True)):
-            demand = float(row[1])
-            felt[job].add(round(float(row[0]), 6))
+            demand = float(row[PLACE.demand])
+            felt[job].add(round(float(row[PLACE.speed]), 6))
             assert wanted == demand or round(wanted, 6) in felt[job]
             assert abs(wanted - demand) <= envs.task.largest_trim
             returned += wanted != demand
         observations, *_ = envs.step(speeds[:, None])
     assert returned > 100
     following, best = (play(one, BEAM, MACHINES, objective="life") for one in (Follow(), BestFelt()))
-    assert best.life.mean() > 1.2 * following.life.mean()
+    assert following.damage.mean() > 1.2 * best.damage.mean()
 
 
 def test_looking_ahead_stays_within_the_range_of_the_task():
@@ -112,8 +113,8 @@ def test_bands_are_skipped_to_the_nearest_edge():
     wild[20:29] = 1.0
     controller = SkipBands(_maps(wild))
     controller.start(gym.make_vec(BEAM, num_envs=3).unwrapped)
-    rows = np.zeros((3, 14))
-    rows[:, 1] = [20.0, 21.5, 22.75]
+    rows = np.zeros((3, len(PLACE)))
+    rows[:, PLACE.demand] = [20.0, 21.5, 22.75]
     assert controller.speeds(rows).tolist() == [20.0, 20.75, 23.25]
 
 

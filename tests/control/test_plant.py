@@ -83,14 +83,14 @@ def test_a_trained_policy_is_told_more():
 
 
 def test_damage_is_that_of_the_peaks():
-    """Under the load rating throughout, a job uses up the life_share of the joint, by definition."""
+    """Under the reference force throughout, a job has the reference damage, by definition."""
 
     class Constant:
         def reset(self):
             """Nothing to do."""
 
         def run(self, speed, cycles):
-            """The load rating."""
+            """The reference force."""
             return np.full(cycles, 95.0)
 
     done = work(Constant(), chaosgym.Operator(Follow(), BEAM))

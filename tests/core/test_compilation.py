@@ -113,15 +113,18 @@ def test_on_two_processors_another_process_compiles_what_moves_a_beam(tmp_path):
 
 
 def test_on_one_processor_no_other_process_compiles(tmp_path):
-    """There it would only take turns with this one."""
+    """There it would only take turns with this one. Where one does, the pipe to it is closed when it ends."""
     code = (
         "from chaosgym.core import compilation; from chaosgym.core.motor import revolution, round_speeds;"
         "compilation.numba.config.NUMBA_DEFAULT_NUM_THREADS = {};"
         "compilation.compile_beside(revolution, round_speeds, '');"
-        "print(compilation._beside[revolution] is not None)"
+        "print(compilation._beside[revolution] is not None); compilation._take_over(revolution, 1)"
     )
-    begun = [_in_a_process(code.format(count), NUMBA_CACHE_DIR=str(tmp_path)) for count in (1, 2)]
-    assert [process.communicate()[0].decode().strip() for process in begun] == ["False", "True"]
+    environment = {"NUMBA_CACHE_DIR": str(tmp_path), "PYTHONWARNINGS": "always::ResourceWarning"}
+    begun = [_in_a_process(code.format(count), **environment) for count in (1, 2)]
+    ended = [process.communicate() for process in begun]
+    assert [out.decode().strip() for out, _ in ended] == ["False", "True"]
+    assert not any(b"ResourceWarning" in err for _, err in ended)
 
 
 @pytest.mark.slow

@@ -7,8 +7,8 @@ from chaosgym.core import status
 from chaosgym.core.cycle import cycle_arrays
 from chaosgym.core.modal_impact import advance_model
 from chaosgym.core.tangent import no_tangents
+from chaosgym.machines.flexible_model import Modes, Stop, flexible_model
 from chaosgym.machines.modal_blocks import largest_modulus, modal_blocks
-from chaosgym.machines.modal_impact import Modes, Stop, flexible_model
 from tests.core.twin import twin_trajectory
 
 TWO_MODES = Modes(

@@ -14,7 +14,8 @@ from chaosgym.machines import ImpactBeam
 
 CALM = ImpactBeam(excitation_frequency=8.0)
 REGION = {"clearance": Tolerance(0.05)}
-CRITERIA = Criteria(load_rating=300.0, hours=1000.0)
+STEEL = {"strength": 1.6e9, "strength_deviation": 0.1e9, "contact_radius": 8e-3, "contact_modulus": 1.15e11}
+CRITERIA = Criteria(load_rating=300.0, hours=1000.0, reliability=0.99, machines_that_meet=0.9, **STEEL)
 BRIEF = 'machine = "impact-beam"\n{}\n[criteria]\nload_rating = "500 N"\nlife = "10 years"\nreliability = 0.99\n'
 
 

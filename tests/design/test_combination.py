@@ -89,7 +89,7 @@ def test_total_indices_of_a_trend_are_the_shares_of_its_slopes(calm):
 def test_without_contact_no_parameter_matters():
     """Forces that are zero throughout have no variance to share."""
     rigid = replace(CALM, force_amplitude=0.01)
-    found = combination(assess(rigid, REGION, Criteria(), series_size=8), base=8)
+    found = combination(assess(rigid, REGION, Criteria(load_rating=500.0, life=1.0), series_size=8), base=8)
     assert found.influences == ()
     assert found.most("peak") is None
     assert found.meeting.share == 1.0

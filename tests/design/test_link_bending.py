@@ -11,7 +11,8 @@ from chaosgym import simulate
 from chaosgym.design.brief import brief_from, read_brief, template
 from chaosgym.design.study import study
 from chaosgym.errors import DesignError, ParameterError
-from chaosgym.machines.mechanism.beam import Beam, beam_link, fibre_stress
+from chaosgym.machines.mechanism.beam import beam_link, fibre_stress
+from chaosgym.machines.mechanism.links import Beam
 
 LENGTH, CRANK, DIAMETER, MODULUS, DENSITY = 0.235, 0.05, 0.008, 2.1e11, 7850.0
 AREA, SECOND = math.pi * DIAMETER**2 / 4.0, math.pi * DIAMETER**4 / 64.0

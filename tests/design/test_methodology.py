@@ -25,17 +25,19 @@ from tests.plain_modes import PLAIN_BEAM
 
 REGION = {"excitation_frequency": Tolerance(0.02), "clearance": Tolerance(0.05)}
 CALM = ImpactBeam(excitation_frequency=10.0)
+STEEL = {"strength": 1.6e9, "strength_deviation": 0.1e9, "contact_radius": 8e-3, "contact_modulus": 1.15e11}
 
 
 @pytest.fixture(scope="module")
 def chaotic():
     """The beam of the thesis at 30 Hz, with criteria it misses."""
-    return assess(ImpactBeam(), REGION, Criteria(load_rating=500.0, life=2000.0, reliability=0.999), series_size=8)
+    asked = Criteria(load_rating=500.0, life=2000.0, reliability=0.999, machines_that_meet=0.9, **STEEL)
+    return assess(ImpactBeam(), REGION, asked, series_size=8)
 
 
 def test_a_periodic_machine_without_tolerances_gives_the_classical_answer():
     """Type I, one force: L = (C / F)^p, R = P(S > s), to the last digit."""
-    found = assess(CALM, {}, Criteria(load_rating=500.0))
+    found = assess(CALM, {}, Criteria(load_rating=500.0, **STEEL))
     force = found.nominal.largest_peak
     assert found.type == "I"
     assert found.evaluation.life == pytest.approx(rating_life(force, 500.0), rel=1e-12)
@@ -48,7 +50,8 @@ def test_a_periodic_machine_without_tolerances_gives_the_classical_answer():
 
 def test_type_i_is_evaluated_by_its_trend():
     """Force rises with clearance; the corner of the tolerances is worse than every machine of the series."""
-    found = assess(CALM, REGION, Criteria(load_rating=500.0, life=1000.0), series_size=8)
+    required = {"life": 1000.0, "reliability": 0.99, "machines_that_meet": 0.9, "safety_factor": 1.0}
+    found = assess(CALM, REGION, Criteria(load_rating=500.0, **required, **STEEL), series_size=8)
     assert found.type == "I"
     assert found.verdict == "meets"
     slopes = dict(zip(found.trend.parameters, found.trend.slopes, strict=True))
@@ -96,7 +99,7 @@ def test_evaluation_of_two_machines_is_the_mean_of_their_damage():
 
 def test_without_contact_nothing_fails():
     """A force of zero: infinite life, full reliability, and null in JSON."""
-    found = evaluate([np.zeros(5)], Criteria(), "")
+    found = evaluate([np.zeros(5)], Criteria(load_rating=500.0, **STEEL), "")
     assert math.isinf(found.life)
     assert found.reliability == pytest.approx(1.0)
     assert math.isinf(found.safety_factor)
@@ -277,7 +280,8 @@ def test_criteria_out_of_range_are_named():
 
 def test_scatter_of_strength_alone_changes_reliability_only():
     """Life does not depend on the strength."""
-    weak = evaluate([np.array([50.0])], replace(Criteria(), strength_deviation=0.3e9), "")
-    strong = evaluate([np.array([50.0])], Criteria(), "")
+    criteria = Criteria(load_rating=500.0, **STEEL)
+    weak = evaluate([np.array([50.0])], replace(criteria, strength_deviation=0.3e9), "")
+    strong = evaluate([np.array([50.0])], criteria, "")
     assert weak.life == strong.life
     assert weak.reliability < strong.reliability

@@ -46,9 +46,13 @@ def two_masses(speed, preload):
     return ModalMachine(modes=structure, joint="load - motor", drives=drives, speed=speed, **joint)
 
 
-@pytest.mark.parametrize(("speed", "preload"), [(20.0, 0.0), (30.0, 0.0), (30.0, 3.0), (45.0, 2.0)])
+@pytest.mark.parametrize(("speed", "preload"), [(22.0, 0.0), (33.0, 0.0), (40.0, 2.0), (45.0, 2.0)])
 def test_forces_of_a_proven_orbit_are_those_of_a_run_that_has_settled(speed, preload):
-    """A proof needs no settled run; what the verdict shows on each surface is the motion after 3,000 more cycles."""
+    """A proof needs no settled run; what the verdict shows on each surface is the motion after 3,000 more cycles.
+
+    Clearances that differ by up to 1e-7 give the same verdict: at other speeds chaos at first lets a rounding of the
+    model decide when it ends, and on which orbit.
+    """
     machine = two_masses(speed, preload)
     verdict = diagnose(machine)
     assert verdict.status == "certified"

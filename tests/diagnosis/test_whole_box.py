@@ -7,11 +7,11 @@ import pytest
 from hypothesis import HealthCheck, example, given, settings
 from hypothesis import strategies as st
 
+from benchmarks.fidelity.stability import runs_of
 from chaosgym.diagnosis import diagnose, response_type
 from chaosgym.errors import ChaosgymError
-from chaosgym.fidelity.stability import runs_of
 from chaosgym.machines import ImpactBeam, SliderCrank
-from tests.fidelity.test_stability import box
+from tests.benchmarks.test_stability import box
 from tests.plain_modes import PLAIN_BEAM
 
 BUDGET = 100
@@ -20,7 +20,7 @@ LONGEST_REVOLUTION = 20_000
 """Steps of a revolution beyond which a crank is left to the tests of budgets: a diagnosis takes hundreds."""
 
 LONGEST_CYCLE = ("damping ratio 100", "reference")
-"""Extreme and rung of a beam whose cycle takes a second; ``tests/fidelity/test_stability.py`` runs three."""
+"""Extreme and rung of a beam whose cycle takes a second; ``tests/benchmarks/test_stability.py`` runs three."""
 
 SLOW = {"excitation_frequency": 0.1}
 OVERDAMPED = {"excitation_frequency": 2.0, "damping_ratio": 1.0}

@@ -5,6 +5,7 @@ import numpy as np
 import pytest
 
 from chaosgym.envs import SB3VecEnv, VisitedSpeeds
+from chaosgym.envs.kernels.steps import PLACE, REPEATS
 from chaosgym.envs.memory import REACH, SpeedMemory, irregularity
 from chaosgym.envs.sb3 import SB3VisitedSpeeds
 
@@ -67,9 +68,9 @@ def test_noise_alone_is_felt_as_two_thirds_of_its_half_width() -> None:
     """Of a motion that repeats, sensors with an error of 1 N make an irregularity of some 0.6 N; chaos adds to it."""
     generator = np.random.default_rng(0)
     peaks = 50.0 + generator.uniform(-1.0, 1.0, (2000, 10))
-    rows = np.zeros((2000, 14))
-    rows[:, 7] = peaks.std(axis=1)
-    for column, lag in ((9, 1), (10, 2), (11, 4)):
+    rows = np.zeros((2000, len(PLACE)))
+    rows[:, PLACE.std_peak_force] = peaks.std(axis=1)
+    for column, lag in REPEATS:
         rows[:, column] = np.abs(peaks[:, lag:] - peaks[:, :-lag]).mean(axis=1)
     assert 0.5 < irregularity(rows).mean() < 0.67
 

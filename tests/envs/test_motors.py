@@ -15,6 +15,8 @@ from chaosgym.control.controllers import Follow
 from chaosgym.control.policies import TrainedPolicy, load_policy, save_policy
 from chaosgym.control.policies.network import Dense, Network
 from chaosgym.control.rollout import play
+from chaosgym.envs.kernels.steps import PLACE
+from chaosgym.envs.observation import OBSERVATION_NAMES
 from chaosgym.envs.task import Status
 from chaosgym.errors import ModelFileError, ParameterError, SimulationError
 from tests.envs.test_vector_env import _assert_same_episodes
@@ -26,7 +28,7 @@ STALL, FULL, WHEEL = 60.0, 1500.0, 0.1
 MOTOR = f'[motor]\nstall_torque = "{STALL} N m"\nno_load_speed = "{FULL} rpm"\ninertia = "{WHEEL} kg m^2"\n'
 LOSSY = '[[spring]]\nbetween = ["ground.shaft", "piston.pin"]\nstiffness = "100 N/m"\nfree_length = "0.1 m"\n'
 RANGE = {"lowest_speed": 600.0, "highest_speed": 1500.0, "lowest_demand": 700.0, "highest_demand": 1350.0}
-EASY = {**RANGE, "drive": "motor", "load_rating": 1e5, "shortest_hold": 4, "longest_hold": 8}
+EASY = {**RANGE, "drive": "motor", "reference_force": 1e5, "shortest_hold": 4, "longest_hold": 8}
 
 
 @pytest.fixture(scope="module")
@@ -115,8 +117,8 @@ def test_side_by_side_gives_the_same_bytes(disturbed, motored):
         **keywords,
     )
     assert _assert_same_episodes((native, sync), 17) > 3
-    again = pickle.loads(pickle.dumps(native.unwrapped.jobs._motors))
-    np.testing.assert_array_equal(again.told, native.unwrapped.jobs._motors.told)
+    again = pickle.loads(pickle.dumps(native.unwrapped.jobs._drive))
+    np.testing.assert_array_equal(again._step, native.unwrapped.jobs._drive._step)
 
 
 def test_a_motor_that_stalls_ends_the_job(motored):
@@ -134,7 +136,7 @@ def test_a_motor_that_stalls_ends_the_job(motored):
     assert info["reward_failure"] < -2.0 * 100
     assert math.isfinite(reward)
     assert env.observation_space.contains(observation)
-    assert observation[0] == 0.0
+    assert observation[PLACE.speed] == 0.0
     assert env.unwrapped.machine.speed == env.unwrapped.nominal.speed
     with pytest.raises(gym.error.ResetNeeded):
         env.step([1500.0])
@@ -153,7 +155,7 @@ def test_a_motor_that_stalls_ends_the_job(motored):
 
 def test_what_controllers_set_makes_up_for_the_slip(motored):
     """Following the demand ends at the demand, more than 50 rpm below the set-point."""
-    keywords = {**RANGE, "drive": "motor", "load_rating": 1e5, "action": "speed"}
+    keywords = {**RANGE, "drive": "motor", "reference_force": 1e5, "action": "speed"}
     envs = gym.make_vec("chaosgym/Machine-v0", num_envs=1, machine=motored(), **keywords, steps=60)
     observation, _ = envs.reset(seed=1)
     policy, missed, slip = Follow(), [], []
@@ -161,7 +163,7 @@ def test_what_controllers_set_makes_up_for_the_slip(motored):
     held = 0
     for _ in range(59):
         observation, _, _, _, info = envs.step(policy(observation))
-        held = held + 1 if observation[0, 1] == info["demand"][0] else 0
+        held = held + 1 if observation[0, PLACE.demand] == info["demand"][0] else 0
         if held > 12:
             missed.append(info["deviation"][0])
             slip.append(info["set_point"][0] - info["speed"][0])
@@ -174,14 +176,15 @@ def test_a_policy_knows_that_it_sets_a_motor(motored, tmp_path):
     """It is kept with the set-point that it sees, plays with a motor by itself, and is refused without one."""
     path, layer = motored(), Dense(np.zeros((6, 15), np.float32), np.eye(6, dtype=np.float32)[5], "none")
     own = chaosgym.read_machine(path).definition
-    save_policy(TrainedPolicy(path, "trim", Network(None, (layer,)), machine=own, asked=("drive",)), tmp_path)
+    observes = (*OBSERVATION_NAMES, "set_point")
+    save_policy(TrainedPolicy(path, "trim", Network(None, (layer,)), machine=own, observes=observes), tmp_path)
     policy = load_policy(tmp_path)
     assert policy.keywords == {"action": "trim", "drive": "motor"}
     speeds = {name: value for name, value in EASY.items() if name != "drive"}
     assert np.nanmin(play(policy, path, [0], **speeds, steps=3).speed) > 0.0
     envs = gym.make_vec("chaosgym/Machine-v0", num_envs=1, machine=path, **speeds)
     envs.reset(seed=0)
-    with pytest.raises(ModelFileError, match="sees drive beside the usual entries, the environment gives none"):
+    with pytest.raises(ModelFileError, match="sees set_point, and the environment gives speed, demand"):
         policy.start(envs.unwrapped)
 
 

@@ -9,6 +9,7 @@ from gymnasium.utils.env_checker import check_env
 
 from chaosgym.control.controllers import Follow
 from chaosgym.control.rollout import play
+from chaosgym.envs.exudyn_beam import ExudynBatch
 from chaosgym.envs.task import Status
 from chaosgym.envs.variants import OTHER_SIMULATOR
 from chaosgym.errors import ChaosgymError, ParameterError
@@ -29,7 +30,7 @@ def test_exudyn_moves_the_same_beam():
     """Periodic at 19 Hz with the same peaks, impacts and bouncing; at 23.25 Hz deviations grow in both."""
     pytest.importorskip("exudyn")
     beam = gym.make(BEAM).unwrapped.nominal
-    batches = beam.batch(1), beam.exudyn_batch(1)
+    batches = beam.batch(1), ExudynBatch(beam, 1)
     (ours, growth), (theirs, grown) = (cycles_of(batch, beam, 19.0) for batch in batches)
     np.testing.assert_allclose(theirs.peak_force[0, -8:], ours.peak_force[0, -8:], rtol=0.01)
     np.testing.assert_array_equal(theirs.impacts[0, -8:], ours.impacts[0, -8:])
@@ -52,7 +53,7 @@ def test_a_job_is_that_of_the_test_in_another_simulator():
     assert ours == theirs
     np.testing.assert_array_equal(demand, same)
     np.testing.assert_allclose(felt, seen, rtol=0.02, atol=0.02)
-    for name in ("type_iii", "clearance", "largest_force", "job_life"):
+    for name in ("type_iii", "clearance", "largest_force", "job_hours"):
         assert other[name] == pytest.approx(info[name], rel=0.05), name
 
 

@@ -16,6 +16,7 @@ from chaosgym.control.comparison import compare
 from chaosgym.control.controllers import Follow, Kriging
 from chaosgym.control.rollout import play
 from chaosgym.control.scores import Scores
+from chaosgym.envs.kernels.steps import PLACE
 from chaosgym.envs.pool import SPLITS, Pool, machine_of, read_pool
 from chaosgym.errors import ParameterError
 from chaosgym.machines.family import KINDS, MODES
@@ -59,7 +60,7 @@ def test_a_step_is_the_machine_at_its_own_speed_in_newtons():
     record = simulate(env.machine, 40)
     peaks = record.peak_force[30:].max(axis=1)
     assert info["largest_force"] == pytest.approx(peaks.max(), rel=1e-9)
-    assert observation[6] == pytest.approx(min(peaks.mean() / row.force, 5.0), rel=1e-5)
+    assert observation[PLACE.mean_peak_force] == pytest.approx(min(peaks.mean() / row.force, 5.0), rel=1e-5)
 
 
 def test_splits_share_no_machine_and_keep_kinds_apart():

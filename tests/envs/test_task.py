@@ -1,5 +1,7 @@
 """What a job costs, by hand: damage, status and the terms of the reward."""
 
+from dataclasses import replace
+
 import gymnasium as gym
 import numpy as np
 import pytest
@@ -9,16 +11,26 @@ from chaosgym.envs.task import LIFE_PRICE, Status, Task, UnknownKeywordError, de
 from chaosgym.errors import ParameterError
 from tests.plain_modes import PLAIN_BEAM
 
-TASK = Task(steps=10, cycles_per_step=2, load_rating=50.0, life_share=0.5)
+TASK = Task(steps=10, cycles_per_step=2, reference_force=50.0, reference_damage=0.5)
 
 
 def test_each_surface_wears_by_its_own_peaks():
-    """Eq. 5.2: a job under the load rating takes the life_share; twice the force takes 2^(10/3) times as much."""
+    """Eq. 5.2: a job under the reference force has the reference damage; twice the force has 2^(10/3) times as much."""
     peaks = np.array([[[50.0, 100.0], [50.0, 0.0]]])
     damage = TASK.damage(peaks)
     assert damage.shape == (1, 2)
     np.testing.assert_allclose(damage[0], [0.5 * 2 / 20, 0.5 * 2.0 ** (10.0 / 3.0) / 20], rtol=1e-12)
     assert TASK.job_cycles == 20
+
+
+def test_lives_compare_without_a_load_rating():
+    """Reference force and damage stand in the damage as D / F^p alone; a ratio of lives depends on neither."""
+    peaks = np.random.default_rng(0).uniform(20.0, 120.0, (2, 20, 2))
+    same = replace(TASK, reference_force=2.0 * 50.0, reference_damage=0.5 * 2.0 ** (10.0 / 3.0))
+    other = replace(TASK, reference_force=731.0, reference_damage=0.3)
+    np.testing.assert_allclose(same.damage(peaks), TASK.damage(peaks), rtol=1e-12)
+    ratio, ratio_there = (np.divide(*task.damage(peaks)) for task in (TASK, other))
+    np.testing.assert_allclose(ratio, ratio_there, rtol=1e-12)
 
 
 def test_a_job_stands_where_the_worst_puts_it():
@@ -122,14 +134,14 @@ def test_a_demand_stays_in_a_range_that_is_smaller_than_its_changes():
 def test_keywords_go_to_the_task_or_to_the_machine():
     """The speed is the agent's; a keyword of neither is named with the one that was meant."""
     task, fields = divided(TASK, PLAIN_BEAM, {"steps": 5, "damping_ratio": 0.02, "fidelity": "standard"})
-    assert (task.steps, task.load_rating, fields) == (5, 50.0, {"damping_ratio": 0.02, "fidelity": "standard"})
+    assert (task.steps, task.reference_force, fields) == (5, 50.0, {"damping_ratio": 0.02, "fidelity": "standard"})
     with pytest.raises(ParameterError, match="is what the agent sets"):
         divided(TASK, PLAIN_BEAM, {"excitation_frequency": 20.0})
     meant = {"damping_ration": "damping_ratio", "step": "steps", "fidelty": "fidelity", "tolerance": "tolerances"}
     for wrong, right in (meant | {"model_fidelty": "model_fidelity"}).items():
         with pytest.raises(UnknownKeywordError, match=rf"'{wrong}'; did you mean {right}\?"):
             divided(TASK, PLAIN_BEAM, {wrong: 0.02})
-    with pytest.raises(UnknownKeywordError, match=r"known: action, steps, .* and the fields of impact-beam"):
+    with pytest.raises(UnknownKeywordError, match=r"known: .*, action, steps, .* and the fields of impact-beam"):
         divided(TASK, PLAIN_BEAM, {"zzz": 0.02})
 
 

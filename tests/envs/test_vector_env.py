@@ -86,7 +86,7 @@ def test_every_kind_of_action(action: str) -> None:
 
 def test_jobs_that_end_apart_start_anew_by_themselves() -> None:
     """Fracture ends some jobs earlier than others; the limit of steps truncates the rest."""
-    envs = _pair(BEAM, AutoresetMode.NEXT_STEP, count=4, load_rating=20.0, max_episode_steps=6)
+    envs = _pair(BEAM, AutoresetMode.NEXT_STEP, count=4, reference_force=20.0, max_episode_steps=6)
     assert _assert_same_episodes(envs, 16, seed=2) >= 6
 
 

@@ -9,10 +9,9 @@ from click.testing import CliRunner
 from chaosgym.cli import app
 from chaosgym.errors import ParameterError
 from chaosgym.fidelity.sample import operating_points
-from chaosgym.fidelity.stability import StabilityCell, StabilityMap
 from chaosgym.fidelity.tradeoff import settings_of, tradeoff
 from chaosgym.machines import ImpactBeam, SliderCrank
-from chaosgym.plotting.fidelity import stability_figure, tradeoff_figure
+from chaosgym.plotting.fidelity import tradeoff_figure
 
 
 @pytest.fixture(scope="module")
@@ -73,18 +72,6 @@ def test_results_are_plain_values_and_draw(beam_ladder):
     left, right = tradeoff_figure(beam_ladder).axes
     assert len(left.lines) == sum(row.wasserstein is not None for row in beam_ladder.rows) + 1
     assert right.get_xlabel() == "processor time [µs per cycle]"
-
-
-def test_stability_figure_shows_rows_columns_and_forces():
-    """Extremes are rows, models are columns, and an answer shows its largest force."""
-    about = {"detail": "", "share_of_bound": 0.1, "seconds": 0.0}
-    cells = (
-        StabilityCell(extreme="force 0", model="draft", outcome="answer", largest_peak=12.5, **about),
-        StabilityCell(extreme="force 0", model="fine", outcome="named error", largest_peak=None, **about),
-    )
-    axes = stability_figure(StabilityMap("impact-beam", cells)).axes[0]
-    assert [text.get_text() for text in axes.texts] == ["12.5 N"]
-    assert [label.get_text() for label in axes.get_xticklabels()] == ["draft", "fine"]
 
 
 def test_the_sample_covers_the_usual_range():

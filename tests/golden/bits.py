@@ -2,7 +2,8 @@
 
 Eigenvectors and inverses differ in their last bits from processor to processor, and chaos magnifies that. Kernels add
 in a fixed order and multiply where their source says so. So they repeat their bits on stored models on every processor
-with fused multiply-add and the same library of elementary functions.
+with fused multiply-add and the same library of elementary functions. Tables of a drive are products by a library of
+linear algebra, which must fuse too (``fuses``).
 
 `python -m tests.golden.bits` writes the file anew. Do so with a change that is meant to move a last digit, and say in
 the commit by how much it moved. Nothing that is shipped rests on these bits.
@@ -15,10 +16,13 @@ from typing import Any
 from unittest.mock import patch
 
 import numpy as np
+from scipy.linalg.blas import dgemm
 
 from chaosgym import ExactEvents, ImpactBeam, SliderCrank
+from chaosgym.core.modal_model import ModalImpactModel
 from chaosgym.core.tangent import Tangents
 from chaosgym.machines import Machine
+from chaosgym.machines.flexible_model import with_tables
 
 STORED = Path(__file__).with_name("bits.npz")
 
@@ -49,6 +53,30 @@ def rebuilt(model: Any, name: str, stored: Mapping[str, np.ndarray]) -> Any:
         fields = zip(model._fields, model, strict=True)  # type: ignore[attr-defined]
         return type(model)(*(rebuilt(one, f"{name}.{field}", stored) for field, one in fields))
     return stored[name] if isinstance(model, np.ndarray) else type(model)(stored[name].item())
+
+
+def turned(model: ModalImpactModel, stored: Mapping[str, np.ndarray]) -> ModalImpactModel:
+    """A model whose modal coordinates have the signs of the stored ones: an eigenvector has no sign of its own."""
+    regimes, others = model.regimes, stored["beam: model.regimes.from_modal"]
+    sign = np.sign(np.sum(regimes.from_modal * others, axis=1))
+    regimes = regimes._replace(
+        to_modal=sign[:, :, None] * regimes.to_modal,
+        from_modal=sign[:, None] * regimes.from_modal,
+        output=sign * regimes.output,
+    )
+    return with_tables(
+        model._replace(regimes=regimes, rest=sign[:, None] * model.rest, drift=sign[:, None] * model.drift)
+    )
+
+
+def fuses() -> bool:
+    """Whether the library that multiplies matrices in kernels rounds a product and its sum once.
+
+    With x = 1 + 2^-30 the square of x less 1 + 2^-29 is 2^-60 then, and else 0.
+    """
+    x = 1.0 + 2.0**-30
+    ahead = np.array([[-1.0 - 2.0**-29, x], [x, -1.0 - 2.0**-29]])  # whichever it adds first
+    return bool(dgemm(1.0, ahead, np.array([[1.0, x], [x, 1.0]])).diagonal().any())
 
 
 def results(machine: Machine, model: Any) -> Arrays:

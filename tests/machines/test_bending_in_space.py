@@ -11,10 +11,11 @@ import pytest
 import chaosgym
 from chaosgym import SliderCrank, simulate
 from chaosgym.errors import ParameterError
-from chaosgym.machines.mechanism.beam import Beam, bending_of, fibre_stress
+from chaosgym.machines.mechanism.beam import bending_of, fibre_stress
 from chaosgym.machines.mechanism.buckling import buckling
 from chaosgym.machines.mechanism.equations import small_motion
 from chaosgym.machines.mechanism.joints import Joint
+from chaosgym.machines.mechanism.links import Beam
 from chaosgym.machines.mechanism.nominal import revolution_of
 from chaosgym.machines.mechanism.space import SpatialBody, spatial_link
 from chaosgym.machines.mechanism.spatial import SpatialMechanism

@@ -7,10 +7,11 @@ import numpy as np
 import pytest
 
 from chaosgym.errors import ParameterError
-from chaosgym.machines.mechanism.beam import Beam, beam_link
+from chaosgym.machines.mechanism.beam import beam_link
 from chaosgym.machines.mechanism.equations import small_motion
 from chaosgym.machines.mechanism.forces import Spring
 from chaosgym.machines.mechanism.joints import Joint
+from chaosgym.machines.mechanism.links import Beam
 from chaosgym.machines.mechanism.mechanism import Mechanism
 from chaosgym.machines.mechanism.nominal import nominal, revolution_of
 from chaosgym.machines.slider_crank.machine import SliderCrank

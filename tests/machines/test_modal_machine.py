@@ -14,6 +14,7 @@ from scipy.io import mmwrite
 from scipy.sparse import csc_matrix
 
 import chaosgym
+from benchmarks.fidelity.bounds import bounded_share
 from chaosgym import Drive, ImpactBeam, ModalMachine, Structure, simulate
 from chaosgym.branches.family_along import continuous_field
 from chaosgym.cli import app
@@ -202,7 +203,7 @@ def test_every_run_stays_within_the_bound_of_passivity():
     for machine in (one_mode(), one_mode(preload=3.0), one_mode(offset=-2e-3), one_mode(drive_level=0.0)):
         record = simulate(machine, 60)
         states = np.vstack([record.section, record.final_state.coordinates])
-        assert machine.share_of_bound(states, record.peak_force) <= 1.0 + 1e-9
+        assert bounded_share(machine, states, record.peak_force) <= 1.0 + 1e-9
 
 
 def test_the_template_is_a_machine(machine_file):
@@ -276,7 +277,7 @@ BAD = {
     "no such file": (
         [("frequencies = ", "# frequencies = "), ('# matrices = "model.npz"', 'matrices = "gone.npz"')], "gone.npz"),
     "no TOML": ([("[joint]", "[joint")], "is not valid TOML"),
-    "a number of no task": ([("# [job]", "[job]"), ("# load_rating", "lode_rating")], None),
+    "a number of no task": ([("# [job]", "[job]"), ("# reference_force", "referense_force")], None),
 }  # fmt: skip
 
 
@@ -286,7 +287,7 @@ def test_bad_files_end_in_one_line(machine_file, case):
     changes, message = BAD[case]
     path = machine_file(*changes)
     if message is None:
-        with pytest.raises(ParameterError, match="no number 'lode_rating'; did you mean load_rating"):
+        with pytest.raises(ParameterError, match="no number 'referense_force'; did you mean reference_force"):
             gym.make("chaosgym/Machine-v0", machine=str(path))
         return
     result = CliRunner().invoke(app, ["show", str(path)])
@@ -365,7 +366,7 @@ def test_new_machine_writes_the_template_once(tmp_path):
 
 def test_stability_tradeoff_and_pictures_take_the_file(machine_file):
     """Every extreme ends in an answer or a named error, and a job is drawn."""
-    from chaosgym.fidelity.stability import stability_map
+    from benchmarks.fidelity.stability import stability_map
 
     machine = chaosgym.read_machine(machine_file())
     assert {cell.outcome for cell in stability_map(machine).cells} <= {"answer", "named error"}

@@ -8,7 +8,7 @@ import pytest
 
 from chaosgym import ModalMachine, SliderCrank, Structure, simulate
 from chaosgym.errors import ParameterError, SimulationError
-from chaosgym.machines.modal_impact import Modes, flexible_model
+from chaosgym.machines.flexible_model import Modes, flexible_model
 from chaosgym.machines.slider_crank import model as crank_model
 
 SECONDS = 300

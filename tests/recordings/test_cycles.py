@@ -1,5 +1,7 @@
 """Series are cut into cycles at equal phases, whatever the recorder did to their time stamps."""
 
+import tracemalloc
+
 import numpy as np
 import pytest
 
@@ -121,3 +123,39 @@ def test_the_cycle_is_stated_once():
         cycle_period(1200.0, 20.0, None)
     with pytest.raises(DiagnosisError, match="above 0"):
         cycle_period(0.0, None, None)
+
+
+def test_a_reading_that_alternates_with_every_sample_is_too_coarse(tmp_path):
+    """Its line is at half the sampling rate: two samples a cycle."""
+    np.save(tmp_path / "n.npy", np.tile([0.0, 1.0], 200))
+    with pytest.raises(DiagnosisError, match=r"a cycle of 2 ms holds 2.0 samples; allowed: at least 8"):
+        peaks_of_series(read_recording(tmp_path / "n.npy"), rate_hz=1000.0)
+
+
+def test_the_cycle_of_a_long_series_is_that_of_all_of_it(tmp_path):
+    """Three million samples, 19.3712 Hz beside the impacts' ringing at 310 Hz: the line of means over the whole record.
+
+    A stated cycle 0.05 % beside it is doubted, as in a short one.
+    """
+    time, hz = np.arange(3_000_000) / 20_000.0, 19.3712
+    value = 40.0 * np.maximum(np.sin(2.0 * np.pi * hz * time), 0.0) ** 5 * np.cos(2.0 * np.pi * 310.0 * time) ** 2
+    np.save(tmp_path / "long.npy", (value + np.random.default_rng(1).normal(0.0, 0.1, len(time))).astype(np.float32))
+    found = read_recording(tmp_path / "long.npy")
+    _, cut = peaks_of_series(found, rate_hz=20_000.0)
+    assert cut.period * hz == pytest.approx(1.0, abs=3e-7)
+    _, cut = peaks_of_series(found, rate_hz=20_000.0, period=1.0005 / hz)
+    assert any("beside the stated" in note for note in cut.notes)
+
+
+def test_a_series_needs_at_most_three_times_its_file(tmp_path):
+    """Six million readings in single precision, from the file to the peaks."""
+    value = 30.0 * np.maximum(np.sin(0.01 * np.arange(6_000_000)), 0.0)
+    np.save(tmp_path / "long.npy", value.astype(np.float32))
+    del value
+    tracemalloc.start()
+    try:
+        peaks_of_series(read_recording(tmp_path / "long.npy"), rate_hz=10_000.0, period=2.0 * np.pi / 100.0)
+        held = tracemalloc.get_traced_memory()[1]
+    finally:
+        tracemalloc.stop()
+    assert held < 3 * (tmp_path / "long.npy").stat().st_size

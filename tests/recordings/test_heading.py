@@ -1,14 +1,16 @@
 """Headings of recorders: names, units, rate and the place of the data, whatever stands above, beside and below them."""
 
 import numpy as np
+import pyarrow as pa
+import pyarrow.parquet as pq
 import pytest
 
 from chaosgym.errors import DiagnosisError
-from chaosgym.recordings.columns import choose_force, choose_time
+from chaosgym.recordings.columns import choose_force
 from chaosgym.recordings.cycles import peaks_of_series
-from chaosgym.recordings.heading import split_unit
+from chaosgym.recordings.quantities import split_unit
 from chaosgym.recordings.read import read_recording
-from chaosgym.recordings.sampling import sampling
+from chaosgym.recordings.sampling import choose_time, sampling
 
 COUNT, STEP = 60, 5e-4
 TIME = np.arange(COUNT) * STEP
@@ -125,3 +127,65 @@ def test_a_counter_is_no_clock(tmp_path):
     assert choose_time(recording) is None
     with pytest.raises(DiagnosisError, match="no time column; use --rate-hz"):
         sampling(recording, COUNT)
+
+
+def test_a_row_of_bare_units_is_no_row_of_names(tmp_path):
+    """Units that are not judged, such as degC, and ones that are not known stand in it too."""
+    for units in ("s,N,degC", "s,N,furlong"):
+        path = tmp_path / "record.csv"
+        path.write_text(f"Time,Force,Other\n{units}\n" + rows("{t:.5f},{x},21.5\n"))
+        recording = read_recording(path)
+        assert list(recording.columns) == ["Time", "Force", "Other"]
+        assert choose_force(recording).name == "Force"
+        assert recording.units["Other"] == units[4:]
+
+
+@pytest.mark.parametrize(
+    ("entries", "values"),
+    [
+        (["1,000.12", "999.50"], [1000.12, 999.5]),
+        (["1,234,567", "1,000"], [1234567.0, 1000.0]),
+        (["1,5", "12,25"], [1.5, 12.25]),
+        (["1,000", "2,500"], [1000.0, 2500.0]),
+    ],
+)
+def test_numbers_in_quotes_may_have_commas(entries, values, tmp_path):
+    """Thousands of spreadsheets in America, decimals of those in Europe; the points beside them tell which."""
+    path = tmp_path / "record.csv"
+    times = ["0,5" if "1,5" in entries else "0.5", "1,5" if "1,5" in entries else "1.5"]
+    lines = [f'"{time}","{entry}"' for time, entry in zip(times, entries, strict=True)]
+    lines = [line if "0,5" in line or "1,5" in line else line.replace('"', "", 2) for line in lines]
+    path.write_text("Time [s],Force [N]\n" + "\n".join(lines * 10) + "\n")
+    assert read_recording(path).columns["Force"][:2].tolist() == values
+
+
+def test_a_comma_that_may_be_either_is_a_question(tmp_path):
+    """1234 or 1.234: nothing else in the file has a point or a comma."""
+    path = tmp_path / "record.csv"
+    path.write_text("n,Force [N]\n" + '1,"1,234"\n2,"5,678"\n' * 5)
+    with pytest.raises(DiagnosisError, match=r"line 2: '1,234' may be 1234 or 1\.234"):
+        read_recording(path)
+
+
+def test_a_heading_repeated_amid_the_data_is_told(tmp_path):
+    """A logger that was started again writes its heading again."""
+    path = tmp_path / "record.csv"
+    head = "Time [s],Force [N]\n"
+    path.write_text(head + rows("{t:.5f},{x}\n", ROWS[:30]) + head + rows("{t:.5f},{x}\n", ROWS[30:]))
+    signal, _ = peaks_of_series(read_recording(path), period=10 * STEP)
+    assert "a heading repeated amid the data left out, first in line 32" in signal.described
+    assert len(signal.values) == COUNT
+
+
+@pytest.mark.parametrize("kind", ["csv", "parquet"])
+def test_a_column_of_text_is_named_as_one(kind, tmp_path):
+    """It is not said to be absent."""
+    path, entries = tmp_path / "record", ["abc", "def", "ghi"] * 5
+    if kind == "csv":
+        path.write_text("cycle,upper\n" + "".join(f"{k},{entry}\n" for k, entry in enumerate(entries)))
+    else:
+        pq.write_table(pa.table({"cycle": range(15), "upper": entries}), path)
+    with pytest.raises(DiagnosisError, match=r"column 'upper' holds text: 'abc' in (line 2|row 1)$"):
+        choose_force(read_recording(path), "upper")
+    with pytest.raises(DiagnosisError, match=r"no column that could be a force .*'upper' holds text: 'abc'"):
+        choose_force(read_recording(path))

@@ -221,7 +221,9 @@ def test_a_scatter_that_could_be_either_asks_for_the_error():
     """60 cycles with a scatter of 1 % are undetermined, and the verdict asks for the sensor's error and more cycles."""
     verdict = judge_peaks(48.9 + 0.489 * np.random.default_rng(6).normal(size=60)).diagnosis
     assert verdict.nature == "undetermined"
-    assert "cannot tell; the sensor's error, more cycles, " in verdict.reason
+    assert verdict.reason.endswith("cannot tell")
+    assert verdict.tells_more[:2] == ("the sensor's error", "more cycles")
+    assert verdict.statement.tells_more.startswith("the sensor's error, more cycles, ")
 
 
 def test_a_sensor_a_little_worse_than_stated_is_no_chaos():

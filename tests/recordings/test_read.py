@@ -184,6 +184,29 @@ def test_no_reading_is_dropped_for_a_quote(tmp_path, row, count, every):
         choose_force(read_recording(path), "force")
 
 
+OTHER_FILES = {
+    "photo.png": b"\x89PNG\r\n\x1a\n" + bytes(range(256)),
+    "report.pdf": b"%PDF-1.4\n%\xe2\xe3\n1 0 obj\n<<>>\nendobj\n",
+    "notes.txt": b"Notes of the rig.\nNothing else.\n",
+    "empty.csv": b"",
+    "code.py": b"import os\n\nfor k in range(3):\n    print(k)\n",
+    "letter.docx": b"PK\x03\x04" + bytes(80),
+    "torn.parquet": b"PAR1" + bytes(99),
+    "torn.mat": b"MATLAB 5.0 MAT-file" + b"\xf4" * 300,
+    "torn.unv": b"    -1\n    58\nx\n    -1\n",
+    "random.bin": b"\x07\x00\xff" * 500,
+}
+
+
+@pytest.mark.parametrize("name", OTHER_FILES)
+def test_files_that_are_no_recordings_say_so_in_one_line(name, tmp_path):
+    """What lies beside recordings in a folder never stops them with another error."""
+    (tmp_path / name).write_bytes(OTHER_FILES[name])
+    with pytest.raises(DiagnosisError, match=name) as error:
+        choose_force(read_recording(tmp_path / name))
+    assert "\n" not in str(error.value)
+
+
 @pytest.mark.skipif(not hasattr(os, "mkfifo"), reason="named pipes")
 def test_pipes_and_devices_never_hang(tmp_path):
     """A pipe that nothing writes into and a device are refused within seconds; a pipe that is written is read."""

@@ -14,6 +14,7 @@ from chaosgym.errors import DiagnosisError
 from chaosgym.recordings.columns import choose_force
 from chaosgym.recordings.read import read_recording
 from chaosgym.recordings.sampling import sampling
+from tests.cli.run import run
 
 RATE = 2000.0
 FORCE = 20.0 + 15.0 * np.sin(0.7 * np.arange(60))
@@ -160,3 +161,48 @@ def test_stamps_of_a_table_are_the_time(tmp_path):
     (tmp_path / "record").write_bytes(stream.getvalue())
     recording = read_recording(tmp_path / "record")
     assert sampling(recording, 60).step == pytest.approx(1.0 / RATE, rel=1e-3)
+
+
+def workbook(path, **sheets):
+    """A workbook with sheets of rows."""
+    openpyxl = pytest.importorskip("openpyxl")
+    book = openpyxl.Workbook()
+    book.remove(book.active)
+    for name, rows in sheets.items():
+        sheet = book.create_sheet(name)
+        for row in rows:
+            sheet.append(row)
+    book.save(path)
+
+
+def test_the_sheet_with_the_data_is_taken_and_named(tmp_path):
+    """Notes before the data may hold a date or a number; a column or a sheet that is asked for decides."""
+    path = tmp_path / "rig.xlsx"
+    one = [("peak [N]",), *((value,) for value in FORCE.tolist())]
+    two = [("load [kN]",), *((value,) for value in FORCE.tolist())]
+    notes = [("date", "2026-01-01"), ("serial", 12)]
+    workbook(path, Notes=notes, One=one, Two=two)
+    recording = read_recording(path)
+    assert (list(recording.columns), recording.form) == (["peak"], "Excel, sheet 'One' of 'Notes', 'One', 'Two'")
+    np.testing.assert_allclose(choose_force(read_recording(path, column="load"), "load").values, 1000.0 * FORCE)
+    np.testing.assert_allclose(choose_force(read_recording(path, sheet="Two")).values, 1000.0 * FORCE)
+    with pytest.raises(DiagnosisError, match="has no sheet 'Three'; its sheets: 'Notes', 'One', 'Two'"):
+        read_recording(path, sheet="Three")
+    with pytest.raises(DiagnosisError, match=r"rig.xlsx has no column 'none'"):
+        choose_force(read_recording(path, column="none"), "none")
+
+
+def test_a_sheet_is_named_by_an_option(tmp_path):
+    """The one that is named is judged, and said in the line of what was read."""
+    path = tmp_path / "rig.xlsx"
+    rows = [("peak [N]",), *((40.0 + place % 2,) for place in range(200))]
+    workbook(path, One=[("peak [N]",), *rows[1:100]], Two=rows)
+    code, out, _ = run("diagnose", "--peaks", path, "--sheet", "Two", "--sensor-error", "0.1 N")
+    assert (code, "Excel, sheet 'Two' of 'One', 'Two', column 'peak' (N), 200 readings" in out) == (0, True)
+
+
+def test_a_sheet_belongs_to_a_workbook(tmp_path):
+    """A text has none."""
+    (tmp_path / "a.csv").write_text("1\n2\n2\n")
+    with pytest.raises(DiagnosisError, match="read as CSV, which has no sheets; got: sheet 'Data'"):
+        read_recording(tmp_path / "a.csv", sheet="Data")

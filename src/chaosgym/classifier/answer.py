@@ -5,13 +5,14 @@ probable, the type's probabilities are those of the rule over every combination 
 """
 
 from collections.abc import Mapping, Sequence
-from dataclasses import asdict, dataclass
+from dataclasses import asdict, dataclass, replace
 from itertools import product
 from typing import Any
 
 from chaosgym.diagnosis import default_tolerances
 from chaosgym.diagnosis.type_rule import CROSS, type_of_cross
 from chaosgym.machines import Machine
+from chaosgym.series import Diagnosis
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -161,6 +162,32 @@ class RecordAnswer:
     def as_dict(self) -> dict[str, Any]:
         """Return plain values for JSON."""
         return {**asdict(self), "plausible": list(self.plausible)}
+
+    def under(self, verdict: Diagnosis) -> "RecordAnswer":
+        """Return the answer under the verdict of ``chaosgym.judge_peaks`` on the same record, which decides.
+
+        The classifier has learned from machines alone and takes many random records for chaos. Its probabilities stand
+        where it names the nature of the verdict; elsewhere ``reason`` says why there are none. Then it has abstained
+        where the verdict is undetermined. What it says of irregularity falls where the verdict contradicts.
+
+        Examples
+        --------
+        >>> import numpy as np
+        >>> peaks = 100.0 + 6.0 * np.random.default_rng(0).normal(size=300)  # white noise
+        >>> learned = chaosgym.default_classifier("impact-beam").classify_record(peaks)
+        >>> learned.nature, learned.under(chaosgym.judge_peaks(peaks).diagnosis).nature
+        ('chaotic', 'undetermined')
+        """
+        answer = self
+        if self.irregular is (verdict.nature == "periodic") and not verdict.condition:
+            answer = replace(answer, irregular=None, irregular_probability=None)
+        if self.nature != verdict.nature:
+            why = self.reason
+            if self.nature is not None:
+                undecided = verdict.nature == "undetermined"
+                why = f"the verdict {'is undetermined' if undecided else 'contradicts what is learned'}"
+            answer = replace(answer, nature_probabilities={}, plausible=(), reason=why or "too close to call")
+        return replace(answer, nature=verdict.nature, period=verdict.period, abstained=verdict.nature == "undetermined")
 
 
 NEGLIGIBLE = 1e-3

@@ -197,6 +197,12 @@ class MachineClassifier:
         sensor_error
             Largest error of a peak [N], if it is known.
 
+        Returns
+        -------
+        RecordAnswer
+            Of a record of machines like those learned from. Random readings may look chaotic to it: where they are
+            possible, take ``answer.under(chaosgym.judge_peaks(peaks).diagnosis)``.
+
         Raises
         ------
         DiagnosisError

@@ -33,13 +33,19 @@ COMMANDS = {
     "train-classifier": "classify:train_classifier",
     "design": "design:design",
     "tradeoff": "fidelity:tradeoff",
-    "stability": "fidelity:stability",
     "compare": "agents:compare",
     "run-agent": "agents:run_agent",
     "demo": "demo:demo",
     "info": "info:info",
 }
 """Module in this folder and function of every command."""
+
+MOVED = {
+    "dataset build": "`python -m benchmarks build-dataset MACHINE` makes it in a clone of the repository",
+    "stability": "`python -m benchmarks stability MACHINE` measures it in a clone of the repository",
+    "dataset card": "`chaosgym dataset info FOLDER` has what it wrote",
+}
+"""Former commands, and what to call instead."""
 
 RARELY = 50_000
 """New objects after which garbage is looked for: imports make many that stay, and a search each 700 takes a tenth."""
@@ -48,7 +54,20 @@ BEYOND_THE_USER = (errno.ENOSPC, errno.EDQUOT, errno.EIO, errno.EROFS, errno.EFB
 """Errors of a disk that no other way of asking would have avoided."""
 
 
-class Commands(click.Group):
+class Group(click.Group):
+    """A group that says what took the place of a command that it had."""
+
+    def resolve_command(
+        self, ctx: click.Context, args: list[str]
+    ) -> tuple[str | None, click.Command | None, list[str]]:
+        """Return the command that is called, its name and its words."""
+        name = f"{ctx.info_name} {args[0]}" if ctx.parent else args[0]
+        if name in MOVED:
+            raise click.UsageError(f"there is no {name} any more: {MOVED[name]}", ctx)
+        return super().resolve_command(ctx, args)
+
+
+class Commands(Group):
     """Commands that are imported when they are called."""
 
     def list_commands(self, ctx: click.Context) -> list[str]:

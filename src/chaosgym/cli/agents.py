@@ -5,6 +5,7 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
+from chaosgym.cli.machine_options import Quantity
 from chaosgym.cli.output import AS_JSON, emit, patience, picture_path, plot_option
 
 if TYPE_CHECKING:
@@ -17,9 +18,11 @@ LEVELS, SPLITS = ("nominal", "clearance", "wear", "fleet"), ("train", "test", "o
 
 KRIGING = "kriging"
 
+LIFE = "life of the joint"
+
 NO_POLICY = (
-    "no policy is shipped for this machine, so kriging played for the joint's life; returns and hours are by "
-    "load_rating, 100 N if [job] in the file says nothing; forces and the ratio of lives do not depend on it"
+    "no policy is shipped for this machine, so kriging played for the joint's life; returns are by reference_force, "
+    "100 N if [job] in the file says nothing; forces and the ratio of lives do not depend on it"
 )
 """What is said where no agent is given."""
 
@@ -105,6 +108,7 @@ def compare(
     help="Of those kept for this; with --plant it draws the demands.",
 )
 @click.option("--level", type=click.Choice(LEVELS), default=None, help="What differs from job to job.")
+@click.option("--load-rating", type=Quantity("N"), help="Of the joint, by which its life is told in hours.")
 @click.option("--plant", default=None, metavar="MODULE:CLASS", help="Your machine instead; - for lines of text.")
 @plot_option("--out", formats="figure .png, .svg, .pdf or animation .gif, .mp4")
 @AS_JSON
@@ -113,6 +117,7 @@ def run_agent(
     policy: Path | None,
     machine: int,
     level: str | None,
+    load_rating: float | None,
     plant: str | None,
     plot: str | None,
     as_json: bool,
@@ -130,6 +135,8 @@ def run_agent(
     if plant is not None:
         if level is not None:
             raise click.UsageError("--level is of simulated machines; leave it out with --plant")
+        if load_rating is not None:
+            raise click.UsageError("--load-rating is of simulated machines; leave it out with --plant")
         if plot is not None:
             raise click.UsageError("--out draws what a simulation tells; leave it out with --plant")
         _at_plant(env, policy, machine, plant, as_json)
@@ -153,9 +160,12 @@ def run_agent(
 
         save_job({name: job, "follow the demand": follow}, out)
     life = float(follow.damage[0] / job.damage[0]) if job.damage[0] > 0.0 else None
+    hours = [None if load_rating is None else float(one.life_hours(load_rating)[0]) for one in (job, follow)]
     result = {"agent": type(agent).__name__, **job.as_dict(), "life": life, "follow": follow.as_dict()}
+    if load_rating is not None:
+        result |= {"load_rating": load_rating, "life_h": [one if one != float("inf") else None for one in hours]}
     result |= {"plot": str(out)} if out else {}
-    emit(result, as_json, lambda: _job_lines(name, job, follow, out))
+    emit(result, as_json, lambda: _job_lines(name, job, follow, load_rating, out))
 
 
 def _at_plant(env: str, policy: Path | None, machine: int, name: str, as_json: bool) -> None:
@@ -179,7 +189,7 @@ def _at_plant(env: str, policy: Path | None, machine: int, name: str, as_json: b
         f"largest force {worked.largest_force:.1f} N"
         for who, worked in ((type(agent).__name__, job), ("following the demand", follow))
     ]
-    told += [] if life is None else [f"life of the joint: x{life:.2f} of that under following the demand"]
+    told += [] if life is None else [f"{LIFE}: x{life:.2f} against following the demand"]
     emit({**result, "follow": follow.as_dict()}, as_json, lambda: told)
 
 
@@ -195,13 +205,15 @@ def _picture(plot: str | None, env: str) -> Path | None:
     return out
 
 
-def _job_lines(name: str, job: "Played", follow: "Played", out: Path | None) -> list[str]:
-    told = job.as_dict()
+def _job_lines(name: str, job: "Played", follow: "Played", load_rating: float | None, out: Path | None) -> list[str]:
+    from chaosgym.design.told import hours_told
+
+    about = job.as_dict()
     lines = [f"{'step':>5s} {'demand':>8s} {'speed [' + job.unit + ']':>12s} {'mean peak [N]':>14s}  Type III"]
-    for step in range(0, len(told["speed"]), 10):
-        demand, speed, peak = told["demand"][step], told["speed"][step], told["mean_peak_force_N"][step]
-        lines.append(f"{step + 1:5d} {demand:8.2f} {speed:12.2f} {peak:14.1f} {told['type_iii'][step]:9.0%}")
-    for who, played in ((name, told), ("following the demand", follow.as_dict())):
+    for step in range(0, len(about["speed"]), 10):
+        demand, speed, peak = about["demand"][step], about["speed"][step], about["mean_peak_force_N"][step]
+        lines.append(f"{step + 1:5d} {demand:8.2f} {speed:12.2f} {peak:14.1f} {about['type_iii'][step]:9.0%}")
+    for who, played in ((name, about), ("following the demand", follow.as_dict())):
         lines.append(
             f"{who}: {played['status'].replace('_', ' ')}, return {played['return']:.2f}, Type III in "
             f"{played['type_iii_share']:.1%} of the cycles, {played['mean_deviation']:.2f} {job.unit} off the demand, "
@@ -210,12 +222,10 @@ def _job_lines(name: str, job: "Played", follow: "Played", out: Path | None) -> 
     if name == KRIGING:
         lines.append(NO_POLICY)
     if job.damage[0] > 0.0:
-        forces, lives = (
-            [float(getattr(one, name)[0]) for one in (job, follow)] for name in ("equivalent_force", "life")
-        )
+        forces = [float(one.equivalent_force[0]) for one in (job, follow)]
         lines.append(f"equivalent force: {forces[0]:.1f} N, {forces[1]:.1f} N under following the demand")
-        lines.append(
-            f"life of the joint: {lives[0]:.3g} h, {lives[1]:.3g} h under following the demand: "
-            f"x{follow.damage[0] / job.damage[0]:.2f}"
-        )
+        lines.append(f"{LIFE}: x{follow.damage[0] / job.damage[0]:.2f} against following the demand")
+        if load_rating is not None:
+            told = [hours_told(float(one.life_hours(load_rating)[0])) for one in (job, follow)]
+            lines.append(f"by --load-rating {load_rating:g} N: {told[0]}, {told[1]} under following the demand")
     return [*lines, *([f"picture: {out}"] if out else [])]

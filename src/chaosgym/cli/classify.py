@@ -3,6 +3,7 @@
 import os
 import sys
 from collections.abc import Iterable
+from itertools import pairwise
 from pathlib import Path
 from typing import Any
 
@@ -19,10 +20,7 @@ KERNELS = ("--follow", "--batch")
 
 def _quick_start(arguments: list[str]) -> None:
     """Run the Python source of the kernels for one record, or parameters alone: loading machine code takes longer."""
-    learned = {"--peaks", "--series"} & {*arguments} or any(
-        text == "--budget-us=0" or pair == ("--budget-us", "0")
-        for text, pair in zip(arguments, zip(arguments, [*arguments[1:], ""], strict=True), strict=True)
-    )
+    learned = {"--peaks", "--series", "--budget-us=0"} & {*arguments} or ("--budget-us", "0") in pairwise(arguments)
     if learned and not ({*KERNELS} & {*arguments} or "numba" in sys.modules):
         os.environ["NUMBA_DISABLE_JIT"] = "1"
 
@@ -133,19 +131,20 @@ def _half_width(measured: Measured, follow: bool) -> float | None:
 
 
 def _learned_lines(answer: Any) -> list[str]:
-    if answer.abstained:
+    chances = _chances(answer)
+    if not chances:
         return [f"  learned: no answer: {answer.reason}"]
     told = {True: "irregular beyond the sensor's error", False: "regular to the sensor", None: "irregularity unknown"}
-    nature = answer.nature or "too close to call"
+    nature = answer.nature if answer.nature_probabilities else f"no answer ({answer.reason})"
     head = f"  learned: {told[answer.irregular]}, amplitude {answer.amplitude:.3g} N; exact nature: {nature}"
     warning = [f"  warning: {answer.warning}"] if answer.warning else []
-    return [head, *_bars(_chances(answer)), *warning]
+    return [head, *_bars(chances), *warning]
 
 
 def _classify_measured(
     classifier: Any, measured: Measured, half_width: float | None, plot: str | None, as_json: bool
 ) -> None:
-    """Print the one verdict on each run, and the classifier's chances as further evidence."""
+    """Print the one verdict on each run, and the classifier's chances where they agree with it."""
     from chaosgym.errors import DiagnosisError
 
     machine = classifier.machine.name
@@ -154,20 +153,13 @@ def _classify_measured(
     runs = measured_runs(measured, several=True, of_force=True)
     for run in runs:
         try:
-            learned = classifier.classify_record(run.peaks, sensor_error=half_width)
+            answer = classifier.classify_record(run.peaks, sensor_error=half_width).under(run.verdict.diagnosis)
         except DiagnosisError as error:
             raise DiagnosisError(f"{run.source}, run {run.name!r}: {error}") from error
-        verdict = run.verdict.diagnosis
-        results[run.name] = {
-            **learned.as_dict(),
-            "nature": verdict.nature,
-            "period": verdict.period,
-            "learned_nature": learned.nature,
-            "verdict": run_as_dict(run),
-        }
+        results[run.name] = {**answer.as_dict(), "verdict": run_as_dict(run)}
         lines += run_lines(f"{machine}, measured" if len(runs) == 1 else run.name, run)
-        lines += _learned_lines(learned)
-        drawn.append((run.name, run.peaks, verdict, _chances(learned)))
+        lines += _learned_lines(answer)
+        drawn.append((run.name, run.peaks, run.verdict.diagnosis, _chances(answer)))
     (only,) = results.values() if len(results) == 1 else (None,)
     result = {"machine": machine, **only} if only else {"machine": machine, "runs": results}
     draw(picture, lambda plots: plots.classified_figure(drawn), result, lines)

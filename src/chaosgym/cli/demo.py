@@ -1,4 +1,4 @@
-"""The commands ``demo``, a tour of a few minutes, and ``explore``, sliders in the browser."""
+"""The commands ``demo``, a tour of a minute, and ``explore``, sliders in the browser."""
 
 from typing import Any
 
@@ -11,12 +11,13 @@ from chaosgym.cli.output import AS_JSON, emit
 @click.command()
 @click.option("--out", type=click.Path(file_okay=False), default="chaosgym-demo", show_default=True, help="New folder.")
 @click.option("--seed", type=click.IntRange(0), default=0, show_default=True)
+@click.option("--train", is_flag=True, help="Train the agent, for some minutes, rather than take the shipped one.")
 @AS_JSON
-def demo(out: str, seed: int, as_json: bool) -> None:
-    """Simulate, label, train, and compare an agent with plain rules: a few minutes (needs the extra [learn])."""
+def demo(out: str, seed: int, train: bool, as_json: bool) -> None:
+    """Simulate, label, learn, and compare an agent with plain rules; a picture a step (needs the extra [learn])."""
     from chaosgym.demo import demo_table, run_demo
 
-    result = run_demo(out, seed, say=lambda line: click.echo(line, err=True))
+    result = run_demo(out, seed, train, say=lambda line: click.echo(line, err=True))
     emit(result, as_json, lambda: demo_table(result))
 
 

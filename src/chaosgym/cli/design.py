@@ -19,7 +19,9 @@ if TYPE_CHECKING:
 @click.option("--template", metavar="MACHINE", help="Print a commented brief of a machine, ready to edit.")
 @measured_options
 @click.option(
-    "--load-rating", type=Quantity("N"), help="With measured forces and no brief: load rating of the surface."
+    "--load-rating",
+    type=Quantity("N"),
+    help="With measured forces and no brief: load rating of the surface, by which its life is told.",
 )
 @click.option("--beside", is_flag=True, help="Put what was measured beside what the briefs' machines do.")
 @click.option("--out", type=click.Path(dir_okay=False), help="HTML report to write, with a JSON file beside it.")
@@ -43,8 +45,8 @@ def design(
 ) -> None:
     """Say whether a machine meets its criteria within its tolerances, and what to change if not.
 
-    FILE.toml is a brief (see --template), or a machine's file, which starts from its template. Several are put side by
-    side, with --beside next to a recording.
+    FILE.toml is a brief (see --template), or a machine's file, which starts from its template. What a brief does not
+    state is not judged. Several are put side by side, with --beside next to a recording.
     """
     from chaosgym.design import brief as briefs
     from chaosgym.design.bearing import Criteria
@@ -63,8 +65,8 @@ def design(
             )
         return _compared(briefs_given, measured, out, overwrite, seed, workers, as_json)
     brief = briefs_given[0] if briefs_given else None
-    if (brief is None) == (load_rating is None or not measured):
-        raise click.UsageError("give a brief (see --template), or --peaks FILE.csv with --load-rating")
+    if (brief is None and not measured) or (load_rating is not None and (brief is not None or not measured)):
+        raise click.UsageError("give a brief (see --template), or --peaks FILE.csv, with --load-rating for a life")
     picture = picture_path(plot, "design-measured" if measured else "design")
     if out is not None:
         report.report_paths(out, overwrite)
@@ -73,9 +75,9 @@ def design(
     if asked is not None:
         note_machine(asked.machine)
     if measured:
-        criteria = asked.criteria if asked is not None else Criteria(load_rating=load_rating or 0.0)
-        stated = asked.stated if asked is not None else ("load_rating",)
-        run, found = _evaluated(measured, criteria, stated)
+        option = {} if load_rating is None else {"load_rating": "--load-rating"}
+        criteria = asked.criteria if asked is not None else Criteria(load_rating=load_rating, stated=option)
+        run, found = _evaluated(measured, criteria)
         page, result, lines = report.measured_report(found), found.as_dict(), [*found.lines(), *run.notes]
         draw(picture, lambda plots: plots.peaks_figure(found), result, lines)
     elif asked is not None:
@@ -92,8 +94,7 @@ def design(
         )
         draw(picture, lambda plots: plots.study_figure(answer), result, lines)
     if of_machine:
-        result["criteria_are_examples"] = True
-        lines.append(f"{brief} is a machine's file, judged by the examples of its template; state your own criteria:")
+        lines.append(f"{brief} is a machine's file, which states no criteria; state yours in a brief:")
         lines.append(f"  chaosgym design --template {brief} > brief.toml")
     if out is not None:
         report.write_report(page, result, out, overwrite)
@@ -101,7 +102,7 @@ def design(
     emit(result, as_json, lambda: lines)
 
 
-def _evaluated(measured: Measured, criteria: "Criteria", stated: tuple[str, ...]) -> "tuple[Run, MeasuredPeaks]":
+def _evaluated(measured: Measured, criteria: "Criteria") -> "tuple[Run, MeasuredPeaks]":
     """What was measured, and what it means by some criteria."""
     from chaosgym.design.measured import evaluate_peaks
 
@@ -113,7 +114,7 @@ def _evaluated(measured: Measured, criteria: "Criteria", stated: tuple[str, ...]
         "date": datetime.date.today().isoformat(),
         "read as": "; ".join(run.notes).removeprefix("read "),
     }
-    return run, evaluate_peaks(run.peaks, criteria, verdict=run.verdict, stated=stated, source=source)
+    return run, evaluate_peaks(run.peaks, criteria, verdict=run.verdict, source=source)
 
 
 def _compared(
@@ -137,7 +138,7 @@ def _compared(
         report_paths(out, overwrite)
     asked = {path: read_brief(path) for path in briefs_given}
     first = next(iter(asked.values()))
-    run, found = _evaluated(measured, first.criteria, first.stated) if measured else (None, None)
+    run, found = _evaluated(measured, first.criteria) if measured else (None, None)
     studies = {path: study(one, seed=seed, workers=workers, progress=True) for path, one in asked.items()}
     rows = comparison_rows(studies, found)
     width = max(len(name) for name in rows)

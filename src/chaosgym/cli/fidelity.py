@@ -1,4 +1,4 @@
-"""The commands ``tradeoff``, the cost of accuracy, and ``stability``, models at extreme parameters."""
+"""The command ``tradeoff``: the cost of accuracy."""
 
 import json
 from pathlib import Path
@@ -10,10 +10,9 @@ from chaosgym.cli.machine_options import FloatRange, machine_command
 from chaosgym.cli.output import WORKERS, emit
 
 if TYPE_CHECKING:
-    from chaosgym.fidelity.stability import StabilityMap
     from chaosgym.fidelity.tradeoff import Tradeoff, TradeoffRow
 
-_FOLDER = click.Path(file_okay=False, path_type=Path)
+FOLDER = click.Path(file_okay=False, path_type=Path)
 
 
 @machine_command
@@ -28,7 +27,7 @@ _FOLDER = click.Path(file_okay=False, path_type=Path)
     help="Processor time of each fixed step [s].",
 )
 @WORKERS
-@click.option("--out", type=_FOLDER, default=None, help="Write tradeoff.json and tradeoff.png there.")
+@click.option("--out", type=FOLDER, default=None, help="Write tradeoff.json and tradeoff.png there.")
 def tradeoff(
     machine: Any,
     points: int,
@@ -48,7 +47,7 @@ def tradeoff(
     if out is not None:
         from chaosgym.plotting.fidelity import tradeoff_figure
 
-        _write(out, "tradeoff", result.as_dict(), tradeoff_figure(result))
+        write_result(out, "tradeoff", result.as_dict(), tradeoff_figure(result))
     emit(result.as_dict(), as_json, lambda: _tradeoff_lines(result))
 
 
@@ -83,31 +82,8 @@ def _tradeoff_line(row: "TradeoffRow") -> str:
     )
 
 
-@machine_command
-@WORKERS
-@click.option("--out", type=_FOLDER, default=None, help="Write stability.json and stability.png there.")
-def stability(machine: Any, workers: int | None, out: Path | None, as_json: bool) -> None:
-    """Run a machine at every extreme on every rung: an answer within physical bounds, or an error with a name."""
-    from chaosgym.fidelity.stability import stability_map
-
-    result = stability_map(machine, workers=workers, progress=True)
-    if out is not None:
-        from chaosgym.plotting.fidelity import stability_figure
-
-        _write(out, "stability", result.as_dict(), stability_figure(result))
-    emit(result.as_dict(), as_json, lambda: _stability_lines(result))
-
-
-def _stability_lines(result: "StabilityMap") -> list[str]:
-    lines = []
-    for cell in result.cells:
-        ended = f"{cell.largest_peak:10.4g} N" if cell.largest_peak is not None else f"{cell.outcome}: {cell.detail}"
-        lines.append(f"{cell.extreme:28s} {cell.model:14s} {ended}")
-    counts = ", ".join(f"{result.count(outcome)} {outcome}s" for outcome in ("answer", "named error", "failure"))
-    return [*lines, f"{result.machine}: {counts}"]
-
-
-def _write(folder: Path, name: str, values: Any, figure: Any) -> None:
+def write_result(folder: Path, name: str, values: Any, figure: Any) -> None:
+    """Write values as JSON and their figure as PNG, both of one name, into a folder."""
     from chaosgym.files import write_atomically
 
     folder.mkdir(parents=True, exist_ok=True)

@@ -22,7 +22,7 @@ class Reading(Quantity):
 
     def convert(self, value: Any, param: click.Parameter | None, ctx: click.Context | None) -> float:
         """Return newton, or an ``InUnit``."""
-        from chaosgym.recordings.columns import OTHERS
+        from chaosgym.recordings.quantities import OTHERS
 
         number, _, unit = value.strip().rpartition(" ") if isinstance(value, str) else ("", "", "")
         if unit not in OTHERS:
@@ -78,6 +78,7 @@ OPTIONS = (
         type=Reading("N"),
         help="Standard deviation of a reading instead. Without either it is estimated from the record.",
     ),
+    click.option("--sheet", metavar="NAME", help="Sheet of a workbook; default the first with the column, or numbers."),
 )
 
 
@@ -97,6 +98,7 @@ class Measured(NamedTuple):
     pulses_per_revolution: int | None
     sensor_error: float | None
     sensor_sigma: float | None
+    sheet: str | None
 
     def __bool__(self) -> bool:
         return bool(self.peaks or self.series)
@@ -139,6 +141,8 @@ def _check(given: Measured, elsewhere: bool) -> None:
     for name in of_series:
         if getattr(given, name) is not None and not given.series:
             raise click.UsageError(f"--{name.replace('_', '-')} belongs to --series")
+    if given.sheet and not (given or elsewhere):
+        raise click.UsageError("--sheet belongs to a workbook that was measured")
     if (given.column or given.unit or given.scale) and not (given or elsewhere):
         raise click.UsageError("--column, --unit and --scale belong to a file that was measured, or to --follow")
     for size in (given.sensor_error, given.sensor_sigma):
@@ -167,7 +171,7 @@ def measured_runs(given: Measured, *, several: bool = False, of_force: bool = Fa
     from chaosgym.recordings.judge import judge_peaks
     from chaosgym.recordings.read import read_recording
 
-    recording = read_recording(given.peaks or given.series or "-")
+    recording = read_recording(given.peaks or given.series or "-", sheet=given.sheet, column=given.column)
     found = []
     names = [] if given.column is None else named_columns(recording, given.column)
     if given.series:
@@ -256,7 +260,7 @@ def measured_sweep(source: str, speed: str | None, given: Measured) -> tuple[Any
     from chaosgym.recordings.measured_sweep import sweep_types
     from chaosgym.recordings.read import read_recording
 
-    recording = read_recording(source)
+    recording = read_recording(source, sheet=given.sheet, column=given.column)
     at = choose_speed(recording, speed)
     force = choose_force(recording, given.column, given.unit, given.scale)
     _ask_for_force(recording.source, force)

@@ -26,7 +26,7 @@ def judged_run_up(given: Measured, orders: float | None) -> tuple[Any, str, str,
 
     if not (given.series and given.tachometer):
         raise click.UsageError("--run-up needs --series FILE --tachometer NAME")
-    recording = read_recording(given.series)
+    recording = read_recording(given.series, sheet=given.sheet, column=given.column)
     signal, instants, turns = series_of(
         recording,
         given.column,

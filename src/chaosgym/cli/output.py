@@ -61,13 +61,9 @@ def emit(result: Mapping[str, Any], as_json: bool, lines: Callable[[], list[str]
 
 
 def verdict_lines(subject: str, verdict: Any, forces: Iterable[str], notes: Iterable[str] = ()) -> list[str]:
-    """Lines on a ``Diagnosis``: nature, why, some notes, and how the peak forces lie."""
-    status = f"{verdict.status}, " if verdict.status else ""
-    return [
-        f"{subject}: {verdict.words} ({status}margin {verdict.margin:.2f})",
-        f"  {verdict.reason}",
-        *(f"  {line}" for line in (*notes, *forces)),
-    ]
+    """The statement of a ``Diagnosis``, some notes, and how the peak forces lie."""
+    headline, *others = verdict.statement.lines()
+    return [f"{subject}: {headline}", *(f"  {line}" for line in (*others, *notes, *forces))]
 
 
 def force_line(summary: Mapping[str, float]) -> str:

@@ -5,6 +5,7 @@ from typing import Any
 
 import click
 
+from chaosgym.cli import Group
 from chaosgym.cli.machine_options import machine_command, millimetres_meant
 from chaosgym.cli.output import AS_JSON, WORKERS, draw, emit, picture_path, plot_option
 
@@ -167,78 +168,9 @@ def _warnings(plan: Any, labelled: Any) -> list[str]:
 FOLDER = click.argument("folder", type=click.Path(exists=True, file_okay=False))
 
 
-@click.group()
+@click.group(cls=Group)
 def dataset() -> None:
-    """Make a dataset of the repository, or describe a folder that `chaosgym sweep` made."""
-
-
-@dataset.command("build")
-@click.argument("machine")
-@click.option("--out", type=click.Path(file_okay=False), help="Folder; default: datasets/MACHINE/whole.")
-@click.option("--crosses", type=click.IntRange(1), default=None, help="The first N crosses; default: all.")
-@click.option(
-    "--sample",
-    type=click.Path(exists=True, file_okay=False),
-    help="Sample to compare with; default: datasets/MACHINE/sample if that is there.",
-)
-@click.option("--no-check", is_flag=True, help="Compare with no sample.")
-@WORKERS
-@click.option("--scheduler", metavar="tcp://HOST:PORT", help="Compute on a Dask cluster (extra [cluster]).")
-@click.option("--repair", is_flag=True, help="Compute damaged chunks again.")
-@AS_JSON
-def build(
-    machine: str,
-    out: str | None,
-    crosses: int | None,
-    sample: str | None,
-    no_check: bool,
-    workers: int | None,
-    scheduler: str | None,
-    repair: bool,
-    as_json: bool,
-) -> None:
-    """Make a dataset that the repository keeps a sample of; the same command again resumes.
-
-    Settings and drawn machines must be those of the sample. Its rows are compared with the same rows of the dataset;
-    exit code 1 if they differ by more than another processor explains.
-    """
-    from chaosgym.sweeps.build import SAMPLE, WHOLE, build_dataset
-
-    if sample and no_check:
-        raise click.UsageError("--sample and --no-check exclude each other")
-    home = Path("datasets") / machine
-    if not sample and not no_check and (home / SAMPLE).is_dir():
-        sample = str(home / SAMPLE)
-    folder = out or str(home / WHOLE)
-    built = build_dataset(
-        machine,
-        folder,
-        sample=sample,
-        crosses=crosses,
-        workers=workers,
-        scheduler=scheduler,
-        repair=repair,
-        progress=True,
-    )
-    found = built.agreement
-    result = {
-        "machine": machine,
-        "folder": folder,
-        "points": len(built.sweep.table),
-        "settings": built.settings,
-        "drawn": built.drawn,
-        "sample": sample,
-        "agreement": found and found.as_dict(),
-    }
-    against = f"those of {sample}" if sample else "compared with no sample"
-    lines = [
-        f"{machine}: complete, {len(built.sweep.table)} points in {folder}",
-        f"  settings {built.settings}, drawn machines {built.drawn}: {against}",
-        *([f"  {found.line}"] if found else []),
-    ]
-    emit(result, as_json, lambda: lines)
-    if found and not found.sound:
-        raise SystemExit(1)
+    """Describe or draw a folder that `chaosgym sweep` made."""
 
 
 @dataset.command("info")
@@ -246,7 +178,7 @@ def build(
 @AS_JSON
 def info(folder: str, as_json: bool) -> None:
     """Print rows, classes, settings, label definitions, faults and provenance."""
-    from chaosgym.sweeps.card import dataset_info
+    from chaosgym.sweeps.info import dataset_info
 
     found = dataset_info(folder)
     emit(found, as_json, lambda: _lines(folder, found))
@@ -256,7 +188,7 @@ def _lines(folder: str, found: dict[str, Any]) -> list[str]:
     rows, settings = found["rows"], found["settings"]
     state = "complete" if found["complete"] else "unfinished: run the command again that makes it"
     if "whole" in settings:
-        state = f"a sample: `chaosgym dataset build {found['machine']}` makes all {settings['whole']['size']} crosses"
+        state = f"a sample of {settings['whole']['size']} crosses"
     plan = ", ".join(
         f"{name} {settings[name]}" for name in ("sampling", "size", "seed", "budget", "signals", "full_types")
     )
@@ -279,17 +211,6 @@ def _lines(folder: str, found: dict[str, Any]) -> list[str]:
     lines.append("  columns:")
     lines += [f"    {name:20s}{meaning}" for name, meaning in found["definitions"].items()]
     return [*lines, *(f"  made by {', '.join(f'{k} {v}' for k, v in made.items())}" for made in found["provenance"])]
-
-
-@dataset.command("card")
-@FOLDER
-@AS_JSON
-def card(folder: str, as_json: bool) -> None:
-    """Write CARD.md into the folder of a finished sweep."""
-    from chaosgym.sweeps.card import write_card
-
-    path = write_card(folder)
-    emit({"wrote": str(path)}, as_json, lambda: [f"wrote {path}"])
 
 
 @dataset.command("map")

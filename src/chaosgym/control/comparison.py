@@ -23,10 +23,10 @@ from chaosgym.errors import DatasetError, ParameterError
 from chaosgym.files import parquet_of, write_atomically
 
 COLUMNS = ("contender", "knows", "seed", "machine", "job_return", "type_iii", "deviation", "damage", "largest_force")
-"""Columns of a comparison's table, one row a job. ``IN_UNITS`` are no part of files of earlier versions."""
+"""Columns of a comparison's table, one row a job. ``LOAD`` is no part of files of earlier versions."""
 
-IN_UNITS = ("equivalent_force", "life")
-"""Columns of the joint: constant peak force that wears as much [N], and life [h]."""
+LOAD = "equivalent_force"
+"""Column of the constant peak force that wears the joint as much [N]."""
 
 SUBJECTS = ("objective", "level", "split", "sealed")
 """Keywords that are part of what a comparison is of."""
@@ -214,7 +214,6 @@ def job_rows(name: str, knows: str, seed: int, played: Played, env: str) -> pa.T
         "largest_force": played.largest_force,
         "failed": played.status != int(Status.JOB_DONE),
         "equivalent_force": played.equivalent_force,
-        "life": played.life,
     }
     return pa.table(columns).replace_schema_metadata({"env": env})
 

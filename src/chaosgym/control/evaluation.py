@@ -109,7 +109,7 @@ def policy_of(given: Any, **keywords: Any) -> Policy:
     ----------
     given
         A controller or a trained policy; a folder of one; a model of stable-baselines3 or its .zip file; or a function
-        from an observation (14,) to an action.
+        from an observation (entries,) to an action.
     keywords
         Of the environment, for a function.
 

@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 from tqdm import tqdm
 
 from chaosgym.arrays import Array
-from chaosgym.envs.observation import OBSERVATION_NAMES
+from chaosgym.envs.kernels.steps import PLACE
 from chaosgym.envs.task import Task
 from chaosgym.envs.vector_env import native_envs
 from chaosgym.machines.parameters import parameters_of
@@ -45,8 +45,8 @@ class Maps:
         return Maps(self.speeds, _smoothed(self.share), _smoothed(self.mean_peak))
 
     def damage(self, task: Task) -> Array:
-        """Share of its life that the joint loses in a step of a task at each speed, (n, s), by the mean peaks."""
-        return damage_in_a_million(self.mean_peak, task.load_rating) * (task.life_share / task.steps)
+        """Damage of the joint in a step of a task at each speed, (n, s), by the mean peaks."""
+        return damage_in_a_million(self.mean_peak, task.reference_force) * (task.reference_damage / task.steps)
 
     def nearest(self, speeds: Array) -> NDArray[np.int64]:
         """Places of the nearest speeds of the maps."""
@@ -79,14 +79,13 @@ def maps_of(
     options = {"speed": float(grid[0])} | ({} if machines is None else {"machine": np.asarray(machines)})
     envs.reset(seed=list(seeds if seeds is not None else range(count)), options=options)
     share, peak = np.zeros((count, len(grid))), np.zeros((count, len(grid)))
-    place = OBSERVATION_NAMES.index("mean_peak_force")
     for k, speed in enumerate(tqdm(grid, desc=progress, unit="speed", disable=progress is None, leave=False)):
         actions = np.full((count, 1), speed, np.float32)
         for step in range(settling + judged):
             observations, *_, info = envs.step(actions)
             if step >= settling:
                 share[:, k] += info["type_iii"] / judged
-                peak[:, k] += observations[:, place] / judged
+                peak[:, k] += observations[:, PLACE.mean_peak_force] / judged
     return Maps(grid, share, peak)
 
 

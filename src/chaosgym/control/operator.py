@@ -16,7 +16,7 @@ from chaosgym.control.policies.learned_map import LearnedMap
 from chaosgym.core.compilation import call
 from chaosgym.envs.drive import DEAD_BAND, MOVES, checked_actions
 from chaosgym.envs.kernels.steps import drive, observe
-from chaosgym.envs.observation import OBSERVATION_NAMES, asked_of
+from chaosgym.envs.observation import OBSERVATION_NAMES
 from chaosgym.envs.vector_env import native_envs
 from chaosgym.errors import ParameterError
 
@@ -69,10 +69,10 @@ class Operator:
                 "an operator is told peak forces, and not the speed to which a motor slips; allowed: "
                 "drive = 'constant', for a drive that holds the speed it is given"
             )
-        if asked := asked_of(self.task):
+        if self.task.added:
             raise ParameterError(
                 f"an operator observes the {len(OBSERVATION_NAMES)} usual entries; allowed: a policy and keywords "
-                f"without {', '.join(asked)}"
+                f"without {', '.join(entry.name for entry in self.task.added)}"
             )
         self.demand = float("nan")
 

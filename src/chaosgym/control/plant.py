@@ -123,7 +123,7 @@ class Worked:
     largest_force
         Of all cycles [N].
     damage
-        Share of its life that the joint used up, by the peaks that were measured.
+        Of the joint by the peaks that were measured, see ``chaosgym.envs.task``.
     """
 
     speed: Array

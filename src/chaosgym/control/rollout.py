@@ -15,11 +15,12 @@ from numpy.typing import NDArray
 from tqdm import trange
 
 from chaosgym.arrays import Array
-from chaosgym.envs.observation import COMMANDED, FELT, OBSERVATION_NAMES
+from chaosgym.envs.observation import FELT
 from chaosgym.envs.pool import SHARE
 from chaosgym.envs.task import Status
 from chaosgym.envs.vector_env import native_envs
 from chaosgym.errors import ParameterError
+from chaosgym.rating_life import damage_in_a_million
 
 
 class Policy(Protocol):
@@ -40,7 +41,7 @@ class Policy(Protocol):
         ...
 
     def __call__(self, observations: Any) -> Any:
-        """Return the actions of all jobs for their observations (n, 14)."""
+        """Return the actions of all jobs for their observations (n, entries)."""
         ...
 
 
@@ -61,10 +62,9 @@ class Played:
     felt : (steps, n, 8)
         What the sensors reported, in the order of ``FELT``.
     damage, largest_force : (n,)
-        Share of its life that the joint used up, and largest true force [N].
-    equivalent_force, life : (n,)
-        Constant peak force [N] that wears as much in each cycle, and hours after which such jobs have used up the
-        joint's life; infinite without wear.
+        Damage of the joint, see ``chaosgym.envs.task``, and largest true force [N].
+    equivalent_force, hours : (n,)
+        Constant peak force [N] that wears as much in each cycle, and time [h] that the job took.
     status : (n,)
         How the jobs ended.
     cycles_per_step
@@ -83,7 +83,7 @@ class Played:
     damage: Array
     largest_force: Array
     equivalent_force: Array
-    life: Array
+    hours: Array
     status: NDArray[np.int64]
     cycles_per_step: int
 
@@ -107,6 +107,13 @@ class Played:
         """Unit of the measured forces: newtons, or shares of a rated force that each machine has."""
         return "of the rated one" if self.unit == SHARE else "N"
 
+    def life_hours(self, load_rating: float) -> Array:
+        """Life [h] at the rate of each job by a load rating [N] (thesis eq. 5.2), (n,); infinite without wear."""
+        cycles = np.isfinite(self.speed).sum(axis=0) * self.cycles_per_step
+        worn = damage_in_a_million(self.equivalent_force, load_rating)
+        with np.errstate(divide="ignore"):
+            return np.asarray(1e6 / worn * self.hours / cycles)
+
     def column(self, name: str) -> Array:
         """One entry of ``FELT`` at every step, (steps, n)."""
         return np.asarray(self.felt[:, :, FELT.index(name)])
@@ -124,7 +131,7 @@ class Played:
             "damage": float(self.damage[0]),
             "largest_force_N": float(self.largest_force[0]),
             "equivalent_force_N": float(self.equivalent_force[0]),
-            "life_h": float(self.life[0]) if self.damage[0] > 0.0 else None,
+            "hours": float(self.hours[0]),
             "unit": self.unit,
             "speed": _plain(self.speed),
             "demand": _plain(self.demand),
@@ -180,8 +187,8 @@ def play(
     policy.start(envs)
     steps, count = envs.task.steps, len(given)
     kept = {name: np.full((steps, count), np.nan) for name in ("speed", "demand", "type_iii", "reward")}
-    felt = np.full((steps, count, len(FELT)), np.nan)
-    last = {name: np.zeros(count) for name in ("damage", "job_largest_force", "job_equivalent_force", "job_life")}
+    felt, reported = np.full((steps, count, len(FELT)), np.nan), [envs.task.places[name] for name in FELT]
+    last = {name: np.zeros(count) for name in ("damage", "job_largest_force", "job_equivalent_force", "job_hours")}
     status = np.zeros(count, np.int64)
     runs = np.ones(count, np.bool_)
     for step in trange(steps, desc=progress, unit="step", disable=progress is None, leave=False):
@@ -189,7 +196,7 @@ def play(
         kept["reward"][step, runs] = rewards[runs]
         for name in ("speed", "demand", "type_iii"):
             kept[name][step, runs] = info[name][runs]
-        felt[step, runs] = observations[runs, len(COMMANDED) : len(OBSERVATION_NAMES)]
+        felt[step, runs] = observations[runs][:, reported]
         status[runs] = info["status"][runs]
         for name, values in last.items():
             values[runs] = info[name][runs]
@@ -205,7 +212,7 @@ def play(
         damage=last["damage"],
         largest_force=last["job_largest_force"],
         equivalent_force=last["job_equivalent_force"],
-        life=last["job_life"],
+        hours=last["job_hours"],
         status=status,
         cycles_per_step=envs.task.cycles_per_step,
         **kept,

@@ -80,8 +80,8 @@ class Scores:
 
         ``life`` is the geometric mean over machines of the joint's life over that of following the demand, ``load`` the
         ratio of the constant forces of equal life, and ``made_worse`` the share of the machines whose return is below
-        that of following by more than ``MADE_WORSE``. ``equivalent_force_N`` and ``life_h`` are geometric means too;
-        they are None for a file of an earlier version. ``against_back_off`` compares with backing off; it is None
+        that of following by more than ``MADE_WORSE``. ``equivalent_force_N`` is a geometric mean too, None
+        for a file of an earlier version. ``against_back_off`` compares with backing off; it is None
         where that has not played.
         """
         mine, zero, one = self.paired(name, ZERO, ONE)
@@ -114,7 +114,6 @@ class Scores:
             "damage": float(np.mean(rows["damage"].to_numpy())),
             "life": float(life),
             "load": float(life ** (-1.0 / LIFE_EXPONENT)),
-            "life_h": _geometric_mean(rows, "life"),
             "equivalent_force_N": _geometric_mean(rows, "equivalent_force"),
             "made_worse": float(np.mean(mine < zero - MADE_WORSE)),
             "against_back_off": self.against(name, SAFE),
@@ -163,7 +162,7 @@ def table_lines(summary: Mapping[str, Mapping[str, Any]]) -> list[str]:
             f"| {name} | {row['knows']} | {row['seeds']} | {row['machines']} | {row['return']:.2f} "
             f"| {row['score']:.2f} | {low:.2f} to {high:.2f} | {row['type_iii']:.1%} | {row['deviation']:.2f} "
             f"| {row['largest_force']:.1f} | {_amount(row['equivalent_force_N'], 'N')}x{row['load']:.2f} "
-            f"| {_amount(row['life_h'], 'h')}x{row['life']:.2f} | {', '.join(f'{share:.0%}' for share in worse)} "
+            f"| x{row['life']:.2f} | {', '.join(f'{share:.0%}' for share in worse)} "
             f"| {difference(row['against_back_off'])} |"
         )
     return lines

@@ -121,9 +121,9 @@ class _Beside(NamedTuple):
         return len(list(Path(self.folder).rglob("*.nbi")))
 
     def end(self) -> None:
-        """Stop it, if it still runs, and remove its folder."""
-        self.process.kill()
-        self.process.wait()
+        """Stop it, if it still runs, close the pipe to it, and remove its folder."""
+        with self.process:
+            self.process.kill()
         shutil.rmtree(self.folder, ignore_errors=True)
 
 

@@ -1,8 +1,8 @@
 """A bearing: its data and what they must suffice for, and what peak forces mean for it (thesis 5.4.2)."""
 
 import math
-from collections.abc import Mapping
-from dataclasses import dataclass, replace
+from collections.abc import Iterable, Mapping
+from dataclasses import dataclass, field, replace
 from typing import Any, Literal
 
 import numpy as np
@@ -18,68 +18,142 @@ from chaosgym.design.reliability import (
     reliability,
     safety_factor,
 )
+from chaosgym.design.told import listed
 from chaosgym.diagnosis import Tolerance
 from chaosgym.errors import ParameterError
 from chaosgym.machines import Machine
-from chaosgym.machines.parameters import by_field, parameter, validate
+from chaosgym.machines.parameters import by_field, check_parameter, parameter, parameters_of
 from chaosgym.numbers import shown
 
-_STEEL = "hardened steel, surface endurance strength 2.76 HB - 70 MPa at 600 HB (Shigley)"
+STRENGTH = ("strength", "strength_deviation", "contact_radius", "contact_modulus")
+"""Criteria that a reliability rests on."""
+
+NEEDS: Mapping[str, tuple[str, ...]] = {
+    "life": ("load_rating", "life"),
+    "reliability": ("reliability", *STRENGTH),
+    "safety factor": ("safety_factor", "strength", "contact_radius", "contact_modulus"),
+}
+"""What must be stated so that each is judged."""
+
+
+def _stated(source: str, unit: str = "-", *, low: float = 0.0, high: float) -> Any:
+    """A criterion without a default: what nobody states is not judged."""
+    return parameter(None, unit=unit, low=low, high=high, provenance="stated", source=source)
 
 
 @dataclass(frozen=True, kw_only=True)
 class Criteria:
     """Bearing data and what they must suffice for, in SI units except life, which is in millions of cycles.
 
+    None stands for what is not stated; it is not judged.
+
     Raises
     ------
     ParameterError
         On construction, if a field is outside its range; names the field, the value and the range.
+
+    Examples
+    --------
+    >>> from chaosgym.design import Criteria
+    >>> Criteria(load_rating=500.0).not_judged[0]
+    'life: not judged; load_rating (given) is stated; state life too'
     """
 
-    load_rating: float = parameter(
-        500.0, unit="N", low=1e-6, high=1e9, provenance="assumed", source="ten times the beam's forces"
-    )
+    load_rating: float | None = _stated("of the bearing", "N", low=1e-6, high=1e9)
     """Force under which the surface lasts a million cycles [N]; C of thesis eq. 5.2."""
-    life: float = parameter(1.0, unit="Mcycles", low=1e-9, high=1e9, provenance="assumed", source="an example")
+    life: float | None = _stated("that is required", "Mcycles", low=1e-9, high=1e9)
     """Life that is required [10^6 cycles]; where ``hours`` are given, what these are at the machine's speed."""
-    hours: float = parameter(0.0, unit="h", low=0.0, high=1e9, provenance="assumed", source="0: the life is in cycles")
-    """Life that is required [h] of operation; 0 where it is stated in cycles."""
-    reliability: float = parameter(0.99, low=0.0, high=1.0, provenance="assumed", source="thesis 5.4.2: high")
+    hours: float | None = _stated("that are required", "h", high=1e9)
+    """Life that is required [h] of operation; None where it is stated in cycles, or not at all."""
+    reliability: float | None = _stated("that is required", high=1.0)
     """Probability that the strength exceeds the stress that is required."""
-    machines_that_meet: float = parameter(
-        0.9, low=0.0, high=1.0, provenance="assumed", source="as the survivors of the rating life, ISO 281"
-    )
+    machines_that_meet: float | None = _stated("that is required", high=1.0)
     """Share of the machines in tolerance that must reach life and reliability by their own statistics."""
-    safety_factor: float = parameter(1.0, low=0.0, high=100.0, provenance="assumed", source="scatter is in reliability")
+    safety_factor: float | None = _stated("that is required", high=100.0)
     """Safety factor SF of eq. 5.6 that responses of Type I and II must have."""
     life_exponent: float = parameter(10.0 / 3.0, low=1.0, high=20.0, provenance="printed", source="thesis eq. 5.2")
     """Exponent p of the life law."""
-    contact_radius: float = parameter(8e-3, unit="m", low=1e-5, high=10.0, provenance="assumed", source="an example")
+    contact_radius: float | None = _stated("of the contact", "m", low=1e-5, high=10.0)
     """Radius of the ball that touches the flat surface [m]."""
-    contact_modulus: float = parameter(
-        1.15e11, unit="Pa", low=1e6, high=1e13, provenance="assumed", source="steel on steel, E = 210 GPa, nu = 0.3"
-    )
+    contact_modulus: float | None = _stated("of the contact", "Pa", low=1e6, high=1e13)
     """Contact modulus E* of both surfaces [Pa]."""
-    strength: float = parameter(1.6e9, unit="Pa", low=1.0, high=1e12, provenance="assumed", source=_STEEL)
+    strength: float | None = _stated("of the surface", "Pa", low=1.0, high=1e12)
     """Mean Hertzian endurance strength [Pa]; S_e of eq. 5.6."""
-    strength_deviation: float = parameter(
-        0.1e9, unit="Pa", low=0.0, high=1e12, provenance="assumed", source="6 % scatter"
-    )
+    strength_deviation: float | None = _stated("of the surface", "Pa", high=1e12)
     """Standard deviation of the strength [Pa]."""
     fatigue_factor: float = parameter(1.0, low=0.1, high=10.0, provenance="assumed", source="smooth surface")
     """Fatigue factor K_f of eq. 5.6, which multiplies the stress."""
     confidence: float = parameter(0.95, low=0.5, high=0.9999, provenance="assumed", source="usual")
     """Confidence of the intervals; statistics must meet the criteria with their unfavourable end."""
+    stated: Mapping[str, str] = field(default_factory=dict, compare=False, repr=False)
+    """Who stated each: "brief.toml:31", or the option of a command."""
 
     def at(self, cycle_period: float) -> "Criteria":
         """Return the criteria of a machine by its cycle [s]: the hours that are required become cycles."""
         return replace(self, life=self.hours / hours_of(1.0, cycle_period)) if self.hours else self
 
     def __post_init__(self) -> None:
-        validate(self)
-        if not 0.0 < self.reliability < 1.0:
+        for name in parameters_of(self):
+            value = getattr(self, name)
+            if value is not None or getattr(type(self), name) is not None:
+                object.__setattr__(self, name, check_parameter(self, name, value))
+        if self.reliability is not None and not 0.0 < self.reliability < 1.0:
             raise ParameterError(f"reliability = {self.reliability:g} is out of range; allowed: above 0, below 1")
+
+    def missing(self, what: str) -> tuple[str, ...]:
+        """What is not stated of the criteria that one of ``NEEDS`` rests on."""
+        return self._lacking(NEEDS[what])
+
+    def _lacking(self, names: Iterable[str]) -> tuple[str, ...]:
+        return tuple(name for name in names if getattr(self, name) is None and not (name == "life" and self.hours))
+
+    @property
+    def judges_machines(self) -> bool:
+        """Whether single machines can be judged: by a life or a reliability."""
+        return not (self.missing("life") and self.missing("reliability"))
+
+    @property
+    def tells_reliability(self) -> bool:
+        """Whether strength and contact are stated, which a reliability needs."""
+        return not self._lacking(STRENGTH)
+
+    @property
+    def asked(self) -> tuple[str, ...]:
+        """Names of the criteria that are stated."""
+        return tuple(
+            name
+            for name in parameters_of(self)
+            if name in self.stated or getattr(self, name) != getattr(type(self), name)
+        )
+
+    def origin(self, name: str) -> str:
+        """Who stated a criterion, or where its value comes from."""
+        value, about = getattr(self, name), parameters_of(self)[name]
+        if value is None:
+            return "not stated"
+        if name in self.stated:
+            return self.stated[name]
+        if name == "life" and self.hours is not None:
+            return self.origin("hours")
+        return "given" if value != getattr(type(self), name) else f"{about.provenance}: {about.source}"
+
+    @property
+    def not_judged(self) -> list[str]:
+        """One line for each of ``NEEDS`` that is not judged, with what to state."""
+        lines = []
+        for what, names in NEEDS.items():
+            missing = self.missing(what)
+            present = [name for name in names if name not in missing]
+            if missing == names:
+                lines.append(f"{what}: not asked; state {listed(names)}")
+            elif missing:
+                told = listed([f"{name} ({self.origin(name)})" for name in present])
+                verb = "is" if len(present) == 1 else "are"
+                lines.append(f"{what}: not judged; {told} {verb} stated; state {listed(missing)} too")
+        if self.machines_that_meet is not None and not self.judges_machines:
+            told = self.origin("machines_that_meet")
+            lines.append(f"machines that meet: not judged; machines_that_meet ({told}) needs a life or a reliability")
+        return lines
 
 
 def hours_of(life: float, cycle_period: float) -> float:
@@ -98,28 +172,29 @@ def variation_region(
 ) -> dict[str, Tolerance]:
     """Region over which the parameters vary (thesis 5.5.2).
 
-    Parameters
-    ----------
-    machine
-        The nominal machine.
-    tolerances
-        By field.
-    region
-        1 or 2 tolerances on either side.
-    wear
-        Give the clearance two tolerances whatever the region, because bearings wear.
+        Parameters
+        ----------
+        machine
+            The nominal machine.
+        tolerances
+            By field.
+        region
+            1 or 2 tolerances on either side.
+        wear
+            Give the clearance two tolerances whatever the region, because bearings wear.
 
-    Raises
-    ------
-    ParameterError
-        If ``region`` is not 1 or 2, or wear is to be considered and the clearance has no tolerance.
+        Raises
+        ------
+        ParameterError
+            If ``region`` is not 1 or 2, or wear is to be considered and the clearance has no tolerance.
 
-    Examples
-    --------
-    >>> from chaosgym.design import variation_region
-    >>> from chaosgym.diagnosis import Tolerance
-    >>> variation_region(chaosgym.ImpactBeam(), {"clearance": Tolerance(0.1)}, region=2)
-    {'clearance': Tolerance(value=0.2100000000000002, relative=True)}
+        Examples
+        --------
+        >>> from chaosgym.design import variation_region
+        >>> from chaosgym.design.told import listed
+    from chaosgym.diagnosis import Tolerance
+        >>> variation_region(chaosgym.ImpactBeam(), {"clearance": Tolerance(0.1)}, region=2)
+        {'clearance': Tolerance(value=0.2100000000000002, relative=True)}
     """
     if region not in (1, 2):
         raise ParameterError(f"region = {shown(region)} is out of range; allowed: 1 or 2 tolerances")
@@ -140,7 +215,7 @@ def _widened(tolerance: Tolerance, factor: int) -> Tolerance:
 
 @dataclass(frozen=True, kw_only=True)
 class Evaluation:
-    """What forces mean for the bearing.
+    """What forces mean for the bearing; NaN stands for what its criteria do not state.
 
     Attributes
     ----------
@@ -176,6 +251,11 @@ class Evaluation:
     normal_reliability: float
     safety_factor: float
 
+    @property
+    def tells_safety(self) -> bool:
+        """Whether a safety factor follows from what is stated."""
+        return not math.isnan(self.safety_factor)
+
 
 def evaluate(blocks: list[Array], criteria: Criteria, method: str, seed: int = 0) -> Evaluation:
     """Evaluate life and reliability over peak forces (thesis 5.4.2).
@@ -198,36 +278,58 @@ def evaluate(blocks: list[Array], criteria: Criteria, method: str, seed: int = 0
     scale = largest or 1.0
     damage = mean_interval([(block / scale) ** exponent for block in blocks], confidence, seed)
     low, high = (scale * value ** (1.0 / exponent) for value in damage)
-    strength = Strength(criteria.strength, criteria.strength_deviation)
-    stresses = [
-        criteria.fatigue_factor * hertz_pressure(block, criteria.contact_radius, criteria.contact_modulus)
-        for block in blocks
-    ]
-    survival = [strength.exceeds(stress) for stress in stresses]
-    mean = float(np.mean([np.mean(stress) for stress in stresses]))
-    square = float(np.mean([np.mean((stress - mean) ** 2) for stress in stresses]))
-    largest_stress = max(float(np.max(stress)) for stress in stresses)
+    rating, required = criteria.load_rating, criteria.life
+    stressed = None if criteria._lacking(NEEDS["safety factor"][1:]) else _stressed(blocks, criteria, seed)
     return Evaluation(
         method=method,
         force=force,
         largest_force=largest,
-        life=rating_life(force, criteria.load_rating, exponent),
-        life_interval=Interval(*(rating_life(end, criteria.load_rating, exponent) for end in (high, low))),
-        conservative_life=conservative_life([largest], criteria.load_rating, exponent),
-        required_load_rating=required_load_rating(force, criteria.life, exponent),
-        reliability=float(np.mean([reliability(stress, strength) for stress in stresses])),
-        reliability_interval=mean_interval(survival, confidence, seed),
-        normal_reliability=normal_reliability(mean, math.sqrt(square), *strength),
-        safety_factor=safety_factor(largest_stress, criteria.strength),
+        life=math.nan if rating is None else rating_life(force, rating, exponent),
+        life_interval=Interval(
+            *(math.nan if rating is None else rating_life(end, rating, exponent) for end in (high, low))
+        ),
+        conservative_life=math.nan if rating is None else conservative_life([largest], rating, exponent),
+        required_load_rating=math.nan if required is None else required_load_rating(force, required, exponent),
+        **(stressed or _UNSTRESSED),
     )
 
 
+_UNSTRESSED: Mapping[str, Any] = {
+    "reliability": math.nan,
+    "reliability_interval": Interval(math.nan, math.nan),
+    "normal_reliability": math.nan,
+    "safety_factor": math.nan,
+}
+
+
+def _stressed(blocks: list[Array], criteria: Criteria, seed: int) -> Mapping[str, Any]:
+    """Safety factor by the stresses of the blocks; reliability too where the scatter of the strength is stated."""
+    mean_strength, radius, modulus = criteria.strength, criteria.contact_radius, criteria.contact_modulus
+    assert mean_strength is not None
+    assert radius is not None
+    assert modulus is not None
+    stresses = [criteria.fatigue_factor * hertz_pressure(block, radius, modulus) for block in blocks]
+    found = {**_UNSTRESSED, "safety_factor": safety_factor(max(float(np.max(one)) for one in stresses), mean_strength)}
+    if criteria.strength_deviation is None:
+        return found
+    strength = Strength(mean_strength, criteria.strength_deviation)
+    survival = [strength.exceeds(stress) for stress in stresses]
+    mean = float(np.mean([np.mean(stress) for stress in stresses]))
+    square = float(np.mean([np.mean((stress - mean) ** 2) for stress in stresses]))
+    return found | {
+        "reliability": float(np.mean([reliability(stress, strength) for stress in stresses])),
+        "reliability_interval": mean_interval(survival, criteria.confidence, seed),
+        "normal_reliability": normal_reliability(mean, math.sqrt(square), *strength),
+    }
+
+
 def plain(values: Mapping[str, Any]) -> dict[str, Any]:
-    """Replace infinite numbers by None, and tuples by lists."""
+    """Replace numbers that are not finite by None, and tuples by lists; no number at all is no list either."""
 
     def one(value: Any) -> Any:
         if isinstance(value, tuple):
-            return [one(each) for each in value]
+            unknown = value and all(isinstance(each, float) and math.isnan(each) for each in value)
+            return None if unknown else [one(each) for each in value]
         return None if isinstance(value, float) and not math.isfinite(value) else value
 
     return {name: one(value) for name, value in values.items()}

@@ -3,9 +3,10 @@
 import os
 import tomllib
 from collections.abc import Mapping
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
 from importlib.resources import files
 from pathlib import Path
+from types import MappingProxyType
 from typing import Any
 
 from chaosgym.design.bearing import Criteria, variation_region
@@ -65,10 +66,8 @@ class DesignBrief:
         A section of the flexible part and its material; None if bending is left out.
     impacts
         Clearances [m] at which the report says where impacts fall.
-    stated
-        Names of the criteria that the brief states itself.
     bending_stated
-        Those of its section on bending.
+        Names that its section on bending states.
     """
 
     machine: Machine
@@ -81,7 +80,6 @@ class DesignBrief:
     wear: Wear | None = None
     bending: Bending | None = None
     impacts: tuple[float, ...] = ()
-    stated: tuple[str, ...] = field(default=())
     bending_stated: tuple[str, ...] = field(default=())
 
 
@@ -111,12 +109,35 @@ def read_brief(path: str | Path) -> DesignBrief:
     text, of_machine = brief_text(path)
     values = tomllib.loads(text)
     beside = Path(path).parent / str(values.get("machine"))
-    if of_machine:
-        return replace(brief_from(values), stated=())
     if beside.suffix == FILE_ENDING and beside.is_file():
         short = Path(os.path.normpath(beside))  # another file where a folder on the way is a link
         values["machine"] = str(short if short.is_file() and short.samefile(beside) else beside)
-    return brief_from(values)
+    return brief_from(values, str(path), {} if of_machine else lines_of(text, "criteria", values))
+
+
+def lines_of(text: str, section: str, values: Mapping[str, Any]) -> dict[str, int]:
+    """Line of each key of a section of a TOML text, from 1; keys whose value takes several lines have none.
+
+    Examples
+    --------
+    >>> from chaosgym.design.brief import lines_of
+    >>> lines_of("[criteria]\\nlife = 5\\n", "criteria", {"criteria": {"life": 5}})
+    {'life': 2}
+    """
+    found, here = dict[str, int](), ""
+    stated = values.get(section, {})
+    for number, line in enumerate(text.splitlines(), 1):
+        try:
+            read = tomllib.loads(line)
+        except tomllib.TOMLDecodeError:
+            continue
+        if line.lstrip().startswith("["):
+            here = ".".join(read)
+            continue
+        own = read if here == section else read.get(section, {}) if not here else {}
+        if isinstance(own, Mapping) and isinstance(stated, Mapping):
+            found |= {key: number for key, value in own.items() if key in stated and stated[key] == value}
+    return found
 
 
 def _read(path: str | Path) -> tuple[str, dict[str, Any]]:
@@ -127,8 +148,10 @@ def _read(path: str | Path) -> tuple[str, dict[str, Any]]:
     return text, values
 
 
-def brief_from(values: Mapping[str, Any]) -> DesignBrief:
-    """Build a design brief from the values of its file."""
+def brief_from(
+    values: Mapping[str, Any], source: str = "brief", lines: Mapping[str, int] = MappingProxyType({})
+) -> DesignBrief:
+    """Build a design brief from the values of its file, the ``source`` with the line of each criterion."""
     name = values.get("machine")
     if not isinstance(name, str):
         raise DesignError(f"machine = {shown(name)} does not exist; {MACHINES.listed('')}")
@@ -148,7 +171,7 @@ def brief_from(values: Mapping[str, Any]) -> DesignBrief:
     wear = region.get("wear", False)
     if not isinstance(wear, bool):
         raise DesignError(f"region.wear = {shown(wear)} is out of range; allowed: true or false")
-    criteria = criteria_of(values, machine)
+    criteria = criteria_of(values, machine, source, lines)
     tolerances = variation_region(machine, tolerances_of(values, machine), region.get("tolerances", 1), wear)
     return DesignBrief(
         machine=machine,
@@ -161,7 +184,6 @@ def brief_from(values: Mapping[str, Any]) -> DesignBrief:
         wear=wear_of(values, machine),
         bending=bending_of(values, machine, tolerances),
         impacts=impacts_of(values, machine),
-        stated=tuple(values.get("criteria", {})),
         bending_stated=tuple(values.get("bending", {})),
     )
 
@@ -207,7 +229,6 @@ def template(name: str) -> str:
         gap=getattr(machine, machine.clearance_field),
         slides=fields[machine.clearance_field].unit == "m",
         bends=bends,
-        criteria=Criteria(),
         tolerances=default_tolerances(machine),
         changes=default_changes(machine),
         nominal=lambda field: written(field, getattr(machine, field)),

@@ -20,9 +20,6 @@ from chaosgym.units import parse_quantity, parse_row, units_of
 BY_FIELD = ("parameters", "tolerances", "changes", "costs")
 """Sections whose keys are fields of the machine."""
 
-REQUIRED_CRITERIA = ("load_rating", "life", "reliability")
-"""Criteria that a brief must state; the others have defaults, which the report lists."""
-
 SECTIONS = (
     "machine",
     "series",
@@ -89,19 +86,21 @@ def table_of(
     return section
 
 
-def criteria_of(values: Mapping[str, Any], machine: Machine) -> Criteria:
-    """Bearing data and requirements, with the life in cycles."""
+def criteria_of(values: Mapping[str, Any], machine: Machine, source: str, lines: Mapping[str, int]) -> Criteria:
+    """Bearing data and requirements, with the life in cycles; each knows its line of the ``source``."""
     known = {name: about for name, about in parameters_of(Criteria).items() if name != "hours"}  # a unit of the life
     section = table_of(values, "criteria", known, machine)
-    for name in REQUIRED_CRITERIA:
-        if name not in section:
-            raise DesignError(f"[criteria] lacks {name}")
     read = {
         key: parse_quantity(f"criteria.{key}", given, known[key].unit)
         for key, given in section.items()
         if key != "life"
     }
-    return Criteria(**read, **_life(section["life"], _hours_a_day(values, machine))).at(machine.cycle_period)
+    hours_a_day = _hours_a_day(values, machine)
+    life = _life(section["life"], hours_a_day) if "life" in section else {}
+    stated = {name: f"{source}:{lines[name]}" if name in lines else source for name in section}
+    if "hours" in life:
+        stated["hours"] = stated["life"]
+    return Criteria(**read, **life, stated=stated).at(machine.cycle_period)
 
 
 def _hours_a_day(values: Mapping[str, Any], machine: Machine) -> float:

@@ -20,10 +20,19 @@ from typing import Any
 
 import numpy as np
 
-from chaosgym.design.bearing import Criteria, Evaluation, evaluate, hours_of
+from chaosgym.design.bearing import Criteria, Evaluation, evaluate
 from chaosgym.design.bending import BendingLife
 from chaosgym.design.fatigue import equivalent_force, required_load_rating
-from chaosgym.design.methodology import Assessment, AtSpeed, Check, assess, checks_of, further_checks, verdict_of
+from chaosgym.design.methodology import (
+    Assessment,
+    AtSpeed,
+    assess,
+    checks_of,
+    enough,
+    further_checks,
+    safety_check,
+    verdict_of,
+)
 from chaosgym.design.reliability import Interval
 from chaosgym.design.wear import WearLife, wear_over
 from chaosgym.diagnosis import Tolerance
@@ -92,8 +101,7 @@ def _over(nominal: Assessment, parts: tuple[AtSpeed, ...], seed: int) -> Assessm
     regular = [part.assessment for part in parts if part.assessment.type in ("I", "II")]
     checks = checks_of("III", evaluation, share, criteria)
     if regular:
-        least = min(one.evaluation.safety_factor for one in regular)
-        checks += (Check("safety factor", least, criteria.safety_factor, ""),)
+        checks += safety_check(min(one.evaluation.safety_factor for one in regular), criteria)
     bent, worn = _bending(parts, cycles), _wear(nominal, parts)
     checks += further_checks(bent, worn, criteria, 1.0 / rate)
     kinds = [part.assessment.type for part in parts]
@@ -130,19 +138,21 @@ def _wear(nominal: Assessment, parts: Sequence[AtSpeed]) -> WearLife | None:
 
 
 def miner(lives: Sequence[float], shares: Sequence[float]) -> float:
-    """Life of a collective from the life at each of its levels, 1 / L = sum p_i / L_i; both in one unit.
+    """Life of a collective from the life at each of its levels, 1 / L = sum p_i / L_i; both in one unit, NaN if one is.
 
     Examples
     --------
     >>> miner([1000.0, 4000.0], [0.5, 0.5])
     1600.0
     """
+    if any(math.isnan(life) for life in lives):
+        return math.nan
     damage = sum(share / life for life, share in zip(lives, shares, strict=True) if share and math.isfinite(life))
     return 1.0 / damage if damage else math.inf
 
 
 def damage_shares(parts: Sequence[AtSpeed]) -> list[float]:
-    """Share of the damage that is done at each speed; zeros where there is none.
+    """Share of the damage that is done at each speed, by the equivalent force there; zeros where there is none.
 
     Examples
     --------
@@ -153,8 +163,12 @@ def damage_shares(parts: Sequence[AtSpeed]) -> list[float]:
     >>> round(sum(damage_shares(found.collective)), 12)
     1.0
     """
+    largest = max(part.assessment.evaluation.force for part in parts) if parts else 0.0
     done = [
-        part.share / hours_of(part.assessment.evaluation.life, part.assessment.machine.cycle_period) for part in parts
+        part.share
+        / part.assessment.machine.cycle_period
+        * (part.assessment.evaluation.force / (largest or 1.0)) ** part.assessment.criteria.life_exponent
+        for part in parts
     ]
     return [one / sum(done) if sum(done) else 0.0 for one in done]
 
@@ -163,6 +177,7 @@ def _evaluation(found: Sequence[Evaluation], cycles: Sequence[float], criteria: 
     force = equivalent_force([one.force for one in found], criteria.life_exponent, np.array(cycles) / sum(cycles))
     low, high = (miner([one.life_interval[end] for one in found], cycles) for end in (0, 1))
     least = [min(one.reliability_interval[end] for one in found) for end in (0, 1)]
+    required = criteria.life
     return Evaluation(
         method=f"Palmgren-Miner over {len(found)} speeds: each as its type asks for; reliability: the least of them",
         force=force,
@@ -170,7 +185,9 @@ def _evaluation(found: Sequence[Evaluation], cycles: Sequence[float], criteria: 
         life=miner([one.life for one in found], cycles),
         life_interval=Interval(low, high),
         conservative_life=miner([one.conservative_life for one in found], cycles),
-        required_load_rating=required_load_rating(force, criteria.life, criteria.life_exponent),
+        required_load_rating=math.nan
+        if required is None
+        else required_load_rating(force, required, criteria.life_exponent),
         reliability=min(one.reliability for one in found),
         reliability_interval=Interval(*least),
         normal_reliability=min(one.normal_reliability for one in found),
@@ -180,11 +197,13 @@ def _evaluation(found: Sequence[Evaluation], cycles: Sequence[float], criteria: 
 
 def _share_that_meets(parts: Sequence[AtSpeed], cycles: Sequence[float], criteria: Criteria, seed: int) -> float:
     """Share of the series, each of whose machines is the same one at every speed, that lives and endures enough."""
+    if not criteria.judges_machines:
+        return math.nan
     exponent = criteria.life_exponent
     rows = zip(*(part.assessment.series.runs or (part.assessment.nominal,) for part in parts), strict=True)
     verdicts = []
     for runs in rows:
         own = [evaluate([run.worse_side(exponent)], criteria, "", seed) for run in runs]
         life = miner([one.life for one in own], cycles)
-        verdicts.append(life >= criteria.life and min(one.reliability for one in own) >= criteria.reliability)
+        verdicts.append(enough(life, min(one.reliability for one in own), criteria))
     return float(np.mean(verdicts))

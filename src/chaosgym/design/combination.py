@@ -20,6 +20,7 @@ A. Saltelli et al., Variance based sensitivity analysis of model output, Compute
 259-270; computed by ``scipy.stats.sobol_indices``.
 """
 
+import math
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any, NamedTuple, get_args
@@ -104,7 +105,8 @@ class Combination:
     natures
         Probability of each nature that occurs.
     meeting
-        Probability that a machine reaches the required life and reliability by its own statistics.
+        Probability that a machine reaches the required life and reliability by its own statistics; None if neither is
+        required.
     influences
         Of each toleranced parameter; empty without tolerances, where forces do not vary, or where a run can't be
         finished.
@@ -114,7 +116,7 @@ class Combination:
 
     types: Mapping[str, Probability]
     natures: Mapping[str, Probability]
-    meeting: Probability
+    meeting: Probability | None
     influences: tuple[Influence, ...]
     sampled: int
 
@@ -126,7 +128,8 @@ class Combination:
     def told(self) -> list[str]:
         """Lines for people."""
         shares = [f"Type {kind} {_told(found)}" for kind, found in self.types.items() if found.share]
-        lines = [f"probability of {', '.join(shares)}; of meeting life and reliability {_told(self.meeting)}"]
+        meeting = "" if self.meeting is None else f"; of meeting what is required {_told(self.meeting)}"
+        lines = [f"probability of {', '.join(shares)}{meeting}"]
         for what, name in (("peak", "largest peak force"), ("life", "life")):
             first = self.most(what)
             if first is not None:
@@ -140,7 +143,7 @@ class Combination:
         return {
             "types": {kind: found._asdict() for kind, found in self.types.items()},
             "natures": {nature: found._asdict() for nature, found in self.natures.items()},
-            "meeting": self.meeting._asdict(),
+            "meeting": None if self.meeting is None else self.meeting._asdict(),
             "total_indices": {
                 one.parameter: {"largest_peak": one.peak._asdict(), "life": one.life._asdict()}
                 for one in self.influences
@@ -218,7 +221,9 @@ def combination(
     return Combination(
         _shares(types, get_args(Type), confidence),
         _shares(natures, get_args(Nature), confidence),
-        probability(round(found.machines_that_meet * len(runs)), len(runs), confidence),
+        None
+        if math.isnan(found.machines_that_meet)
+        else probability(round(found.machines_that_meet * len(runs)), len(runs), confidence),
         influences(
             found.machine,
             found.region,

@@ -1,19 +1,15 @@
 """Statements of a design study that contradict its own machines."""
 
-from typing import TYPE_CHECKING
-
 import numpy as np
 
 from chaosgym.design.bearing import hours_of
+from chaosgym.design.design_study import DesignStudy
 from chaosgym.design.methodology import Assessment
 from chaosgym.design.surroundings import MIDDLE, in_tolerance
 from chaosgym.diagnosis.type_rule import FORCE_CHANGE
 
-if TYPE_CHECKING:
-    from chaosgym.design.study import DesignStudy
 
-
-def contradictions(answer: "DesignStudy") -> list[str]:
+def contradictions(answer: DesignStudy) -> list[str]:
     """Statements of a study that contradict its own machines; none of a study that ``study`` returns.
 
     The type is held against every machine of the series, of the neighbourhood and of the map within the tolerances,
@@ -32,7 +28,8 @@ def contradictions(answer: "DesignStudy") -> list[str]:
         said.append(f"Type I, with {largest:.4g} N in the tolerances and {found.response.largest_peak:.4g} N nominally")
     if found.type in ("I", "II") and found.evaluation.largest_force < largest * (1.0 - 1e-9):
         said.append(f"largest peak {found.evaluation.largest_force:.4g} N, with {largest:.4g} N in the tolerances")
-    if (found.verdict == "meets") != ("undetermined" not in found.types and all(check.met for check in found.checks)):
+    met = bool(found.checks) and all(check.met for check in found.checks)
+    if (found.verdict == "meets") != ("undetermined" not in found.types and met):
         said.append(f"the verdict {found.verdict!r} does not follow from type and checks")
     said += _of_parts(found)
     best = None if answer.improvement is None else answer.improvement.best
@@ -57,6 +54,8 @@ def contradictions(answer: "DesignStudy") -> list[str]:
 def _of_parts(found: Assessment) -> list[str]:
     """Criteria of the flexible part and of wear that are not what was found of these."""
     lives = dict[str, float]()
+    if found.criteria.life is None:
+        return []
     if found.bending is not None:
         lives["bending life"] = min(found.bending.lives) / found.bending.bending.uncertainty
     if found.wear is not None:

@@ -133,6 +133,8 @@ def _held(case: Case, found: Assessment) -> str:
 def _next(found: Assessment) -> str:
     if found.verdict == "meets":
         return "the criteria are met: go on to the prototype stage, and measure there what was assumed"
+    if found.verdict == "not judged":
+        return "nothing is judged: state what the machine must reach, and go through phase VII then"
     if found.verdict == "undetermined":
         return "the nominal response is undetermined: settle it by more cycles or by other nominal values, then go on"
     missed = [check.name for check in found.checks if not check.met]

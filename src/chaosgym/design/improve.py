@@ -6,13 +6,16 @@ map, the life against speed and the sensitivities suggest, and pairs of fields a
 tolerances run for some cycles. Those that lie on the front of cost against life and robustness as screened are then
 assessed like any other, so that no suggestion rests on a screening or an extrapolation: responses of Type II and III
 have no derivative to trust.
+
+Where nothing is judged, nothing says what suffices. The values that are stated are then assessed alone and compared by
+type, by force and by the life beside the present one; none is called sufficient, and nothing is screened.
 """
 
 import math
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from itertools import combinations
-from typing import Any
+from typing import Any, get_args
 
 import numpy as np
 from tqdm import tqdm
@@ -21,12 +24,14 @@ from chaosgym.arrays import Array
 from chaosgym.design.bearing import Evaluation, evaluate
 from chaosgym.design.changes import allowed, between, change_cost, default_changes, differing, distinct, part_of
 from chaosgym.design.collective import assess_duty
-from chaosgym.design.methodology import SERIES_SIZE, Assessment, Check
+from chaosgym.design.fatigue import equivalent_force
+from chaosgym.design.methodology import SERIES_SIZE, Assessment, Check, enough
 from chaosgym.design.runs import deviating, sobol_shares, worse_side
 from chaosgym.design.told import listed
 from chaosgym.errors import DesignError, ParameterError, SimulationError
 from chaosgym.machines import Machine
 from chaosgym.machines.parameters import quantity_of, with_settings
+from chaosgym.series import Type
 from chaosgym.simulation import parallel_map, simulate
 
 SCREENED_MACHINES, SCREENED_CYCLES = 8, 60
@@ -52,6 +57,10 @@ class Trial:
     changes: Mapping[str, float]
     cost: float
     assessment: Assessment
+    relative_life: float = math.nan
+    """Life in operation over that of the machine as it is: by ``force``, the exponent, and the cycle's time."""
+    force: float = math.nan
+    """Equivalent force over the machines built [N], whatever the type, so that changes compare like with like."""
 
     @property
     def meets(self) -> bool:
@@ -60,13 +69,35 @@ class Trial:
 
     @property
     def life(self) -> float:
-        """Life by the assessment, in required lives."""
-        return self.assessment.evaluation.life_interval.low / self.assessment.criteria.life
+        """Life in required lives; in present ones where no life is judged."""
+        required = self.assessment.criteria.life
+        if required is None or not self.judges_life:
+            return self.relative_life
+        return self.assessment.evaluation.life_interval.low / required
+
+    @property
+    def judges_life(self) -> bool:
+        """Whether a life is required, and a load rating stated, by which it follows from the force."""
+        return not self.assessment.criteria.missing("life")
 
     @property
     def robustness(self) -> float:
-        """Share of the machines in the tolerances that reach life and reliability by their own statistics."""
-        return self.assessment.machines_that_meet
+        """Share of the machines in the tolerances that reach life and reliability by their own statistics.
+
+        Where neither is required, the share of those that are periodic.
+        """
+        if self.assessment.criteria.judges_machines:
+            return self.assessment.machines_that_meet
+        runs = self.assessment.series.runs or (self.assessment.nominal,)
+        return sum(run.nature == "periodic" for run in runs) / len(runs)
+
+    @property
+    def compared(self) -> str:
+        """Type, force and life beside the machine as it is, for people."""
+        found, lasts = self.assessment, self.relative_life
+        life = f"life x{lasts:.3g} of the present one" if math.isfinite(lasts) else "no contact"
+        force = f"equivalent {self.force:.1f} N over the machines built"
+        return f"{self.told}: Type {found.type}, {force}, {life}, cost {self.cost:.2f}"
 
     @property
     def told(self) -> str:
@@ -82,7 +113,9 @@ class Trial:
             "changes": dict(self.changes),
             "cost": self.cost,
             "type": self.assessment.type,
-            "life_in_required_lives": self.life if math.isfinite(self.life) else None,
+            "life_in_required_lives": self.life if self.judges_life and math.isfinite(self.life) else None,
+            "force_of_machines_N": self.force,
+            "relative_life": self.relative_life if math.isfinite(self.relative_life) else None,
             "robustness": self.robustness,
             **{name: result[name] for name in kept},
         }
@@ -96,7 +129,7 @@ class Improvement:
     ----------
     suggestions
         Changes that were assessed, best first: those that meet the criteria by cost, then the others by how far they
-        miss.
+        miss. Where nothing is judged: by type, then by life.
     best
         The cheapest change found that meets the criteria; None if none does.
     screened
@@ -120,6 +153,11 @@ class Improvement:
         if not self.suggestions:
             return "no change to try is stated"
         nearest = self.suggestions[0]
+        if nearest.assessment.verdict == "not judged":
+            return (
+                f"changes, {len(self.suggestions)} assessed, are compared by type and force, since nothing is judged; "
+                f"first: {nearest.compared}"
+            )
         missed = [f"{check.name} {check.told}" for check in nearest.assessment.checks if not check.met]
         return (
             f"none of {len(self.suggestions)} changes that were assessed meets all criteria; nearest: {nearest.told} "
@@ -157,7 +195,7 @@ def improve(
     workers: int | None = None,
     progress: bool = False,
 ) -> Improvement:
-    """Search the cheapest change with which a machine meets its criteria.
+    """Search the cheapest change with which a machine meets its criteria; without any, compare the changes.
 
     Every value of ``changes`` is assessed alone. Further candidates are screened, and those on the front of cost
     against life and robustness are assessed too. The cheapest one that suffices is then taken back towards the nominal
@@ -218,7 +256,10 @@ def improve(
             )
         except (SimulationError, ParameterError, DesignError):
             return None
-        return Trial(dict(change), change_cost(machine, change, weights, force), result)
+        after = force_of_machines(result)
+        return Trial(
+            dict(change), change_cost(machine, change, weights, force), result, _lives(assessment, result, after), after
+        )
 
     stated = [
         {name: float(value)} for name, row in values.items() for value in row if value != getattr(machine, name, None)
@@ -228,7 +269,7 @@ def improve(
     further = distinct([one for one in proposed if one and allowed(machine, one, force)], singles)
     pairs = distinct([{**a, **b} for a, b in combinations([*singles, *further], 2) if a.keys().isdisjoint(b)], [])
     pairs = sorted(pairs, key=lambda one: change_cost(machine, one, weights, force))[:MOST_PAIRS]
-    candidates = [*further, *pairs]
+    candidates = [*further, *pairs] if assessment.checks else []
     with tqdm(total=len(singles), desc="changes", disable=not progress, unit="machine") as bar:
         trials = []
         for change in singles:
@@ -249,6 +290,27 @@ def improve(
     return Improvement(tuple(sorted(done, key=_rank)), best, len(candidates))
 
 
+def force_of_machines(found: Assessment) -> float:
+    """Equivalent force [N] over the machines built, each equally likely, and over the speeds of the duty."""
+    exponent, forces, rates = found.criteria.life_exponent, list[float](), list[float]()
+    for share, one in [(part.share, part.assessment) for part in found.collective] or [(1.0, found)]:
+        runs = (one.nominal, *one.series.runs)
+        forces.append(
+            equivalent_force([equivalent_force(run.worse_side(exponent), exponent) for run in runs], exponent)
+        )
+        rates.append(share / one.machine.cycle_period)
+    return equivalent_force(forces, exponent, np.array(rates) / sum(rates))
+
+
+def _lives(present: Assessment, changed: Assessment, after: float) -> float:
+    """Life in operation of a changed machine, with its force [N], in lives of the present one."""
+    before = force_of_machines(present)
+    if after == 0.0:
+        return math.inf if before else 1.0
+    slower = changed.cycle_period / present.cycle_period
+    return float((before / after) ** present.criteria.life_exponent * slower)
+
+
 def _front_of_screened(
     assessment: Assessment,
     candidates: Sequence[Mapping[str, float]],
@@ -261,8 +323,9 @@ def _front_of_screened(
     screened = _screened(assessment, candidates, seed, workers, progress)
     force = assessment.evaluation.force
     rows = [(-change_cost(assessment.machine, one, weights, force), *screened[k]) for k, one in enumerate(candidates)]
-    least = assessment.criteria.machines_that_meet
-    likely = [k for k, row in enumerate(rows) if row[1] >= 1.0 and row[2] >= least]
+    least = assessment.criteria.machines_that_meet or 0.0
+    lasting = 0.0 if assessment.criteria.missing("life") else 1.0
+    likely = [k for k, row in enumerate(rows) if row[1] >= lasting and row[2] >= least]
     if not likely:
         best = sorted(range(len(rows)), key=lambda k: (-rows[k][2], -rows[k][1]))
         return [candidates[k] for k in best[: MOST_VERIFIED // 2]]
@@ -280,7 +343,13 @@ def _screened(
     workers: int | None,
     progress: bool,
 ) -> list[tuple[float, float]]:
-    """Life in required lives, at most 100 of them, and share of machines that meet, from few short runs of each."""
+    """Life in required lives, at most 100 of them, and share of machines that meet, from few short runs of each.
+
+    Where no life is judged, it is in lives of the machine as it is, by the force alone.
+    """
+    if not candidates:
+        return []
+    present = force_of_machines(assessment) or 1.0
     region, criteria, exponent = assessment.region, assessment.criteria, assessment.criteria.life_exponent
     shares = sobol_shares(len(region), SCREENED_MACHINES, seed) if region else np.zeros((1, 0))
 
@@ -292,8 +361,11 @@ def _screened(
             return None
         own = criteria.at(machine.cycle_period) if criteria.hours else criteria
         found = evaluate([worse_side(peaks, exponent)], own, "")
+        if own.life is None or own.missing("life"):
+            return replace(found, life=min((present / found.force) ** exponent if found.force else 1e6, 1e6))
         return replace(found, life=min(found.life / own.life, 1e6))
 
+    relative = criteria if criteria.life is None else replace(criteria, life=1.0, hours=None)
     tasks = [(one, row) for one in candidates for row in shares]
     found = parallel_map(run, tasks, workers=workers, progress="screened" if progress else None)
     answers = []
@@ -301,7 +373,7 @@ def _screened(
         runs = found[k * len(shares) : (k + 1) * len(shares)]
         kept = [one for one in runs if one is not None]
         life = len(kept) / sum(1.0 / one.life for one in kept) if len(kept) == len(runs) else 0.0
-        meets = sum(one.life >= 1.0 and one.reliability >= criteria.reliability for one in kept) / len(runs)
+        meets = sum(enough(one.life, one.reliability, relative) for one in kept) / len(runs)
         answers.append((min(life, 100.0), meets))
     return answers
 
@@ -324,7 +396,12 @@ def _taken_back(machine: Machine, best: Trial, attempt: Any) -> Trial:
 
 
 def _rank(trial: Trial) -> tuple[bool, tuple[float, ...]]:
-    """Those that meet the criteria by cost, the others by the factors by which they miss, the largest one first."""
+    """Those that meet the criteria by cost, the others by the factors by which they miss, the largest one first.
+
+    Where nothing is judged: by type, then by life.
+    """
+    if not trial.assessment.checks:
+        return False, (get_args(Type).index(trial.assessment.type), -trial.life)
     if trial.meets:
         return False, (trial.cost,)
     return True, tuple(sorted((_shortfall(check) for check in trial.assessment.checks), reverse=True))

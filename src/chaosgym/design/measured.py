@@ -1,6 +1,6 @@
 """Evaluation of measured peak forces without a machine model: nature, life and reliability."""
 
-from collections.abc import Iterable, Mapping
+from collections.abc import Mapping
 from dataclasses import dataclass, field
 from types import MappingProxyType
 from typing import Any
@@ -9,15 +9,13 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from chaosgym.arrays import Array
-from chaosgym.design.bearing import Criteria, Evaluation, evaluate, plain
+from chaosgym.design.bearing import STRENGTH, Criteria, Evaluation, evaluate, plain
 from chaosgym.design.reliability import time_blocks
 from chaosgym.design.statistics import Convergence, Histogram, as_forces, convergence, histogram, require_enough
 from chaosgym.errors import DesignError
+from chaosgym.machines.parameters import quantity_of
 from chaosgym.recordings.judge import judge_peaks
 from chaosgym.recordings.measured_verdict import MeasuredVerdict
-
-STRENGTH = ("strength", "strength_deviation", "contact_radius", "contact_modulus")
-"""Criteria that a reliability rests on; without them it is left out."""
 
 FOLLOWS = {
     "periodic": "every cycle loads the surface alike, so that the life follows from one period",
@@ -47,8 +45,6 @@ class MeasuredPeaks:
         Distribution and its modes.
     evaluation
         Life and reliability.
-    stated
-        Names of the criteria that were asked for; the others are examples, and nothing of theirs is told.
     source
         Where the peaks come from: "file", "sha256", "date" and the like.
     """
@@ -59,13 +55,7 @@ class MeasuredPeaks:
     convergence: Convergence
     histogram: Histogram
     evaluation: Evaluation
-    stated: tuple[str, ...] = ("load_rating",)
     source: Mapping[str, str] = field(default_factory=lambda: MappingProxyType({}))
-
-    @property
-    def strength_stated(self) -> bool:
-        """Whether the criteria state a strength, which a reliability needs."""
-        return all(name in self.stated for name in STRENGTH)
 
     @property
     def headline(self) -> str:
@@ -82,27 +72,37 @@ class MeasuredPeaks:
             return ""
         return f"estimate: {found.recorded} cycles recorded, {found.needed} needed for statistics to rely on"
 
+    @property
+    def life_line(self) -> str:
+        """Life by the load rating, and who stated that, for people."""
+        found, rating = self.evaluation, self.criteria.load_rating
+        if rating is None:
+            return "life              not asked; state load_rating"
+        return (
+            f"life              {found.life:.4g} million cycles, {found.life_interval.low:.4g} to "
+            f"{found.life_interval.high:.4g}; conservative {found.conservative_life:.4g}; by a load rating of "
+            f"{rating:g} N ({self.criteria.origin('load_rating')})"
+        )
+
     def lines(self) -> list[str]:
         """Return lines for people."""
         found, asked = self.evaluation, self.criteria
         lines = [
             self.headline,
-            f"  {self.verdict.diagnosis.reason}",
+            *(f"  {line}" for line in self.verdict.diagnosis.statement.lines()[1:]),
             *(f"  {note}" for note in self.verdict.notes),
             *([self.doubt] if self.doubt else []),
-            f"life              {found.life:.4g} million cycles, {found.life_interval.low:.4g} to "
-            f"{found.life_interval.high:.4g}; conservative {found.conservative_life:.4g}",
-            f"equivalent force  {found.force:.2f} N with exponent {asked.life_exponent:.3g}; load rating "
-            f"{asked.load_rating:g} N",
+            self.life_line,
+            f"equivalent force  {found.force:.2f} N with exponent {asked.life_exponent:.3g}",
             f"{len(self.peaks)} cycles, mean {np.mean(self.peaks):.2f} N, standard deviation "
             f"{np.std(self.peaks):.2f} N, largest {found.largest_force:.2f} N",
         ]
-        if self.strength_stated:
+        if asked.tells_reliability:
             lines += [
                 f"reliability       {found.reliability:.6f}, {found.reliability_interval.low:.6f} to "
                 f"{found.reliability_interval.high:.6f}; normal approximation {found.normal_reliability:.6f}",
-                f"                  strength {1e-9 * asked.strength:g} +- {1e-9 * asked.strength_deviation:g} GPa, "
-                f"ball radius {1e3 * asked.contact_radius:g} mm, contact modulus {1e-9 * asked.contact_modulus:g} GPa",
+                "                  "
+                + ", ".join(f"{name.replace('_', ' ')} {quantity_of(asked, name)}" for name in STRENGTH),
             ]
         else:
             lines.append(f"no reliability: it needs {', '.join(STRENGTH)} in a brief")
@@ -110,23 +110,19 @@ class MeasuredPeaks:
 
     def as_dict(self) -> dict[str, Any]:
         """Return plain values for JSON; None stands for what was not asked for."""
-        evaluation = plain(vars(self.evaluation))
-        left_out = (
-            [] if self.strength_stated else [name for name in evaluation if "reliability" in name or "safety" in name]
-        )
-        left_out += [] if "life" in self.stated else ["required_load_rating"]
         return {
             "nature": self.verdict.diagnosis.nature,
             "period": self.verdict.diagnosis.period,
             "verdict": self.verdict.as_dict(),
-            "criteria": {name: getattr(self.criteria, name) for name in self.stated},
+            "criteria": {name: getattr(self.criteria, name) for name in self.criteria.asked},
+            "stated_by": dict(self.criteria.stated),
             "cycles": {**vars(self.convergence), "converged": self.convergence.converged},
             "estimate": self.doubt or None,
             "mean_N": float(np.mean(self.peaks)),
             "standard_deviation_N": float(np.std(self.peaks)),
             "largest_N": float(np.max(self.peaks)),
             "modes_N": self.histogram.modes.tolist(),
-            "evaluation": {**evaluation, **dict.fromkeys(left_out)},
+            "evaluation": plain(vars(self.evaluation)),
             "source": dict(self.source),
         }
 
@@ -136,7 +132,6 @@ def evaluate_peaks(
     criteria: Criteria,
     *,
     verdict: MeasuredVerdict | None = None,
-    stated: Iterable[str] = ("load_rating",),
     source: Mapping[str, str] = MappingProxyType({}),
 ) -> MeasuredPeaks:
     """Evaluate measured peak forces, one a cycle.
@@ -149,8 +144,6 @@ def evaluate_peaks(
         Bearing data.
     verdict
         Nature of the response; judged without a stated sensor error if None.
-    stated
-        Names of the criteria that were asked for.
     source
         Where the peaks come from, for the report.
 
@@ -184,6 +177,5 @@ def evaluate_peaks(
         convergence(values),
         histogram(values),
         evaluate(time_blocks(values), criteria, "statistics of the measured peak forces"),
-        tuple(stated),
         source,
     )

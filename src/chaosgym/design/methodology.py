@@ -32,7 +32,7 @@ from chaosgym.design.fatigue import equivalent_force
 from chaosgym.design.reliability import time_blocks
 from chaosgym.design.runs import DIAGNOSIS_BUDGET, NOMINAL_BUDGET, Series, SettledRun, build_series, settled_run
 from chaosgym.design.statistics import Convergence, convergence
-from chaosgym.design.told import CRITERIA
+from chaosgym.design.told import CRITERIA, listed
 from chaosgym.design.trend import Trend, fit_trend
 from chaosgym.design.wear import Wear, WearLife, wear_life
 from chaosgym.diagnosis import Neighbour, ResponseType, Tolerance, default_tolerances, diagnose, response_type
@@ -40,7 +40,7 @@ from chaosgym.machines import Machine
 from chaosgym.machines.parameters import parameters_of
 from chaosgym.series import Type
 
-Verdict = Literal["meets", "fails", "undetermined"]
+Verdict = Literal["meets", "fails", "undetermined", "not judged"]
 
 SERIES_SIZE = 32
 """Machines of the series that represents the region."""
@@ -54,6 +54,8 @@ class Check:
     reached: float
     required: float
     unit: str
+    stated: str = ""
+    """Who stated what is required: "brief.toml:31", or the option of a command."""
 
     @property
     def met(self) -> bool:
@@ -102,9 +104,9 @@ class Assessment:
     checks
         Each criterion.
     verdict
-        "meets", "fails", or "undetermined" where the nominal response is.
+        "meets", "fails", "undetermined" where the nominal response is, or "not judged" without a criterion.
     machines_that_meet
-        Share of the series, each judged by its own statistics.
+        Share of the series, each judged by its own statistics; NaN without a life or a reliability that is required.
     bending
         How long the flexible part lasts; None if it is left out.
     wear
@@ -149,12 +151,29 @@ class Assessment:
         """Type of the response."""
         return self.response.type
 
+    @property
+    def not_judged(self) -> list[str]:
+        """One line for each question that no criterion asks, with what to state."""
+        parts = {"bending life": self.bending, "wear life": self.wear}
+        lines = [f"{name}: not judged; state life" for name, part in parts.items() if part is not None]
+        return self.criteria.not_judged + (lines if self.criteria.life is None else [])
+
+    @property
+    def judged(self) -> str:
+        """The verdict, by which criteria, and who stated these."""
+        if not self.checks:
+            why = "no criterion is complete" if self.criteria.asked else "no criterion is stated"
+            return f"not judged, since {why}"
+        names = [f"{check.name} ({check.stated})" for check in self.checks]
+        return f"{self.verdict}, judged by {listed(names)}"
+
     def as_dict(self) -> dict[str, Any]:
-        """Return plain values for JSON; None stands for an infinite life."""
+        """Return plain values for JSON; None stands for an infinite life, and for what is not asked."""
         return {
             "machine": self.machine.name,
             "parameters": {name: getattr(self.machine, name) for name in parameters_of(self.machine)},
             "criteria": {name: getattr(self.criteria, name) for name in parameters_of(self.criteria)},
+            "stated_by": dict(self.criteria.stated),
             "region": {name: tolerance._asdict() for name, tolerance in self.region.items()},
             "verdict": self.verdict,
             "response": self.response.as_dict(),
@@ -169,10 +188,11 @@ class Assessment:
             "evaluation": plain(vars(self.evaluation)),
             "nominal_evaluation": plain(vars(self.nominal_evaluation)),
             "checks": [plain({**vars(check), "met": check.met}) for check in self.checks],
+            "not_judged": self.not_judged,
             "sensitivities": dict(zip(self.trend.parameters, self.trend.slopes.tolist(), strict=True)),
             "series": {
                 "machines": len(self.series.runs),
-                "share_that_meets": self.machines_that_meet,
+                "share_that_meets": None if np.isnan(self.machines_that_meet) else self.machines_that_meet,
                 "largest_peak_N": [run.largest_peak for run in self.series.runs],
                 "nature": [run.nature for run in self.series.runs],
             },
@@ -203,7 +223,7 @@ def assess(
     tolerances
         Region by field, see ``variation_region``; the usual tolerances of the machine if None.
     criteria
-        Bearing data and requirements; the defaults of ``Criteria`` if None.
+        Bearing data and requirements; what they do not state is not judged.
     series_size
         Machines that represent the region.
     further
@@ -230,8 +250,10 @@ def assess(
     --------
     >>> from chaosgym.design import Criteria, assess
     >>> beam = chaosgym.ImpactBeam(excitation_frequency=10.0)
-    >>> assess(beam, criteria=Criteria(load_rating=500.0), series_size=4)
+    >>> assess(beam, criteria=Criteria(load_rating=500.0, life=1000.0), series_size=4)
     <impact-beam: Type I, meets>
+    >>> assess(beam, series_size=4)
+    <impact-beam: Type I, not judged>
     """
     region = default_tolerances(machine) if tolerances is None else dict(tolerances)
     criteria = (criteria or Criteria()).at(machine.cycle_period)
@@ -302,13 +324,26 @@ def _by_type(
 
 
 def checks_of(kind: Type, evaluation: Evaluation, share: float, criteria: Criteria) -> tuple[Check, ...]:
-    """Each criterion beside what is reached; the safety factor for Types I and II only."""
-    life = Check("fatigue life", evaluation.life_interval.low, criteria.life, "million cycles")
-    endures = Check("reliability", evaluation.reliability_interval.low, criteria.reliability, "")
-    built = Check("machines that meet", share, criteria.machines_that_meet, "")
+    """Each criterion that is stated beside what is reached; the safety factor for Types I and II only."""
+    checks = []
+    if not criteria.missing("life"):
+        checks.append(_check("fatigue life", evaluation.life_interval.low, criteria, "life", "million cycles"))
+    if not criteria.missing("reliability"):
+        checks.append(_check("reliability", evaluation.reliability_interval.low, criteria, "reliability"))
+    if criteria.machines_that_meet is not None and criteria.judges_machines:
+        checks.append(_check("machines that meet", share, criteria, "machines_that_meet"))
     if kind in ("I", "II"):
-        return life, endures, built, Check("safety factor", evaluation.safety_factor, criteria.safety_factor, "")
-    return life, endures, built
+        checks += safety_check(evaluation.safety_factor, criteria)
+    return tuple(checks)
+
+
+def safety_check(reached: float, criteria: Criteria) -> tuple[Check, ...]:
+    """The safety factor beside the one that is required; none if it is not asked for."""
+    return () if criteria.missing("safety factor") else (_check("safety factor", reached, criteria, "safety_factor"),)
+
+
+def _check(name: str, reached: float, criteria: Criteria, field: str, unit: str = "") -> Check:
+    return Check(name, reached, getattr(criteria, field), unit, criteria.origin(field))
 
 
 def further_checks(
@@ -320,21 +355,31 @@ def further_checks(
         lives["bending life"] = bent.assured
     if worn is not None:
         lives["wear life"] = worn.assured / hours_of(1.0, cycle_period)
-    return tuple(Check(name, life, criteria.life, "million cycles") for name, life in lives.items())
+    if criteria.life is None:
+        return ()
+    return tuple(_check(name, life, criteria, "life", "million cycles") for name, life in lives.items())
 
 
 def verdict_of(kind: Type, checks: tuple[Check, ...]) -> Verdict:
     """Verdict of the checks: "fails" if one is missed, "undetermined" if the type is, else "meets"."""
+    if not checks:
+        return "not judged"
     if not all(check.met for check in checks):
         return "fails"
     return "undetermined" if kind == "undetermined" else "meets"
 
 
+def enough(life: float, reliability: float, criteria: Criteria) -> bool:
+    """Whether a machine's own life [10^6 cycles] and reliability reach those that are required."""
+    lasts = bool(criteria.missing("life")) or (criteria.life is not None and life >= criteria.life)
+    endures = bool(criteria.missing("reliability")) or reliability >= (criteria.reliability or 0.0)
+    return lasts and endures
+
+
 def _share_that_meets(runs: tuple[SettledRun, ...], criteria: Criteria, seed: int) -> float:
     """Share of machines whose own life and reliability, without confidence interval, suffice."""
+    if not criteria.judges_machines:
+        return float("nan")
     exponent = criteria.life_exponent
-    verdicts = []
-    for run in runs:
-        own = evaluate([run.worse_side(exponent)], criteria, "", seed)
-        verdicts.append(own.life >= criteria.life and own.reliability >= criteria.reliability)
-    return float(np.mean(verdicts))
+    own = [evaluate([run.worse_side(exponent)], criteria, "", seed) for run in runs]
+    return float(np.mean([enough(one.life, one.reliability, criteria) for one in own]))

@@ -66,7 +66,8 @@ def suggested(
     """
     machine, criteria = found.machine, found.criteria
     fields = (machine.speed_field, machine.clearance_field)
-    lacking = criteria.life / max(found.evaluation.life_interval.low, 1e-300)
+    lasts = found.evaluation.life_interval.low
+    lacking = 1.0 if criteria.missing("life") or criteria.life is None else criteria.life / max(lasts, 1e-300)
     seeds = list[dict[str, float]]()
     if trend is not None and fields[0] in brief.changes:
         speeds = trend.longer_lived(getattr(machine, fields[0]), max(lacking, 1.0))

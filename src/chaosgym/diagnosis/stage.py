@@ -15,6 +15,10 @@ GROWS = 1.05
 """Ratio of the largest displacements of the last quarter and of the one before it, above which a motion grows."""
 
 
+LARGER = ("a larger budget of cycles",)
+"""What tells more of a run that has not settled."""
+
+
 @dataclass(frozen=True)
 class Stage:
     """What is known after a stage.
@@ -93,7 +97,7 @@ def without_contact(stage: Stage) -> Diagnosis:
     )
     if last > GROWS * before or exponent.sign > 0:
         reason = f"{lead}, but its motion still grows after {len(record)} cycles, so that contact may come later"
-        return Diagnosis(nature="undetermined", margin=0.0, status="unresolved", reason=reason)
+        return Diagnosis(nature="undetermined", margin=0.0, status="unresolved", reason=reason, tells_more=LARGER)
     if exponent.sign < 0:
         reason = f"{lead}, and its response nears the period of the drive; exponent {exponent.per_cycle:.3g} a cycle"
         return Diagnosis(nature="periodic", period=1, margin=0.0, status="agreed", reason=reason)
@@ -115,7 +119,7 @@ def not_periodic(stage: Stage) -> Diagnosis:
     if exponent.sign < 0 and verdict.nature == "periodic":
         return Diagnosis(nature="periodic", period=verdict.period, margin=0.0, status="agreed", reason=reason)
     reason = f"not settled after {len(stage.record)} cycles: {reason}"
-    return Diagnosis(nature="undetermined", margin=0.0, status="unresolved", reason=reason)
+    return Diagnosis(nature="undetermined", margin=0.0, status="unresolved", reason=reason, tells_more=LARGER)
 
 
 def votes(stage: Stage) -> dict[str, Nature]:

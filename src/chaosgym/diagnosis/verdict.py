@@ -20,6 +20,7 @@ class MachineDiagnosis(Diagnosis):
         The motion on the proven orbit, whole periods of it; None where none was proven.
     """
 
+    searched: str = "not looked for"
     record: CycleRecord | None = field(default=None, repr=False, compare=False)
     orbit_record: CycleRecord | None = field(default=None, repr=False, compare=False)
 
@@ -55,5 +56,5 @@ class MachineDiagnosis(Diagnosis):
 
 def of_machine(verdict: Diagnosis, **changes: Any) -> MachineDiagnosis:
     """Return a verdict on a series as that on its machine, with some fields changed, such as ``record``."""
-    own = {each.name: getattr(verdict, each.name) for each in fields(verdict)}
+    own = {each.name: getattr(verdict, each.name) for each in fields(verdict) if each.name != "searched"}
     return MachineDiagnosis(**{**own, **changes})

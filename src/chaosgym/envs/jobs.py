@@ -10,25 +10,19 @@ from numpy.typing import NDArray
 from chaosgym.arrays import Array, Indices
 from chaosgym.core.compilation import call
 from chaosgym.core.motor import round_speeds
-from chaosgym.envs.classified import RecordsAtSpeed
 from chaosgym.envs.drive import DEAD_BAND, MOVES
 from chaosgym.envs.judge import ExponentJudge, Judge, RecurrenceJudge
-from chaosgym.envs.kernels.steps import INFO, JOB, MOTOR, REPORT, drive, observe, settle
-from chaosgym.envs.motors import Motors
-from chaosgym.envs.observation import Observation, observation_names, sensed
+from chaosgym.envs.kernels.steps import JOB, REPORT, drive, observe, settle
+from chaosgym.envs.motors import ConstantSpeed, Motors
+from chaosgym.envs.observation import Observation, sensed
 from chaosgym.envs.pool import Pool
 from chaosgym.envs.task import Status, Task, demand_of
 from chaosgym.envs.variants import DRAWN, Variants
 from chaosgym.errors import SimulationError
 from chaosgym.machines.batch import Cycles, KickedBatch, VaryingBatch
 from chaosgym.machines.machine import Machine
-from chaosgym.recordings.monitor import RepeatSums
 
 Generators = Sequence[np.random.Generator]
-
-
-LEAST_ERROR = 1e-6
-"""Error [N] that the monitor of ideal sensors reckons with."""
 
 
 DRAWS = 20
@@ -64,7 +58,7 @@ class Jobs:
     demand : (N, steps + 1)
         Of every step of the job.
     damage : (N, sides)
-        Share of its life that each surface has used up.
+        Of each surface; 1 ends a job.
     told
         Names of the columns of a report that are the info of a step.
     force : (N,)
@@ -77,11 +71,9 @@ class Jobs:
         nominal = variants.nominal
         self.task, self.variants, self.space, self.batch = task, variants, space, variants.batch(count)
         self.judge: Judge = (ExponentJudge if isinstance(self.batch, VaryingBatch) else RecurrenceJudge)(count)
-        self._monitor = RepeatSums(count) if task.monitor == "on" else None
-        self._records = RecordsAtSpeed(nominal, task.sensor_error, count) if task.classifier == "on" else None
-        self._motors = Motors(nominal, count) if task.drive == "motor" else None
-        self.told = INFO if self._motors is None else (*INFO, *MOTOR)
-        self._places = {name: place for place, name in enumerate(observation_names(task))}
+        self._entries = [entry(task, nominal, count) for entry in task.added]
+        self._drive = (Motors if task.drive == "motor" else ConstantSpeed)(nominal, count)
+        self.told = self._drive.info
         self.machines: list[Machine] = [nominal] * count
         self.state = np.zeros(count, JOB)
         self.state["speed"], self.state["machine"] = task.lowest_speed, DRAWN
@@ -128,7 +120,7 @@ class Jobs:
         task, variants = self.task, self.variants
         count = max(task.run_in_cycles, task.cycles_per_step)
         self._draw(which, generators, numbers, speed)
-        if self._motors is not None and numbers is None:
+        if numbers is None:
             self._redraw_stalled(which, generators, speed, count)
         state = self.state[which]
         state["trim"], state["worn"] = 0.0, state["clearance"]
@@ -137,17 +129,14 @@ class Jobs:
             state[name] = 0
         self.state[which], self.damage[which] = state, 0.0
         self.judge.start(which)
-        if self._monitor is not None:
-            self._monitor.forget(which)
-        if self._records is not None:
-            self._records.forget(which)
+        for entry in self._entries:
+            entry.forget(which)
         for i in which.tolist():
             self.batch.start(i, self.machines[i].at(self._speed_of(i)))
-        if self._motors is not None:
-            self._start_motors(which)
+        self._start_drive(which)
         cycles, growth, period = self._run(which, count, generators)
-        if self._motors is not None and self._motors.stalled[which].any():
-            first = int(which[int(self._motors.stalled[which].argmax())])
+        if (stalled := self._drive.stalled[which]).any():
+            first = int(which[int(stalled.argmax())])
             whose = (
                 f", on {DRAWS} other machines drawn too" if numbers is None else ", on a machine kept for evaluation"
             )
@@ -188,23 +177,20 @@ class Jobs:
 
     def _redraw_stalled(self, which: Indices, generators: Generators, speed: float | None, count: int) -> None:
         """Draw others for those of the jobs ``which`` whose motor would stall within ``count`` cycles."""
-        assert self._motors is not None
         for _ in range(DRAWS):
-            set_points = self._start_motors(which)
-            self._motors.turn(which, set_points, count, self.task.cycles_per_step)
-            stalled = self._motors.stalled[which]
+            set_points = self._start_drive(which)
+            self._drive.turn(which, set_points, count, self.task.cycles_per_step)
+            stalled = self._drive.stalled[which]
             if not stalled.any():
                 return
             generators = [each for each, again in zip(generators, stalled, strict=True) if again]
             which = which[stalled]
             self._draw(which, generators, None, speed)
 
-    def _start_motors(self, which: Indices) -> Array:
-        """Let cranks turn at the speeds of their jobs, which are returned in the unit of the machine."""
-        assert self._motors is not None
+    def _start_drive(self, which: Indices) -> Array:
+        """Let machines turn at the speeds of their jobs, which are returned in the unit of the machine."""
         speeds = self._lowest[which] + self._span[which] * self.speed[which]
-        for i, speed in zip(which.tolist(), speeds.tolist(), strict=True):
-            self._motors.start(i, self.machines[i], speed)
+        self._drive.start(which, self.machines, speeds)
         return speeds
 
     def step(self, which: Indices, actions: Array, generators: Generators) -> StepResult:
@@ -218,13 +204,11 @@ class Jobs:
         verdict = self.judge.verdict(which, growth, self.variants.nominal.sensed(peaks))
         report, reward = np.empty(len(which), REPORT), np.empty(len(which))
         outcome = np.where(cycles.failed, Status.SIMULATION_FAILED, Status.RUNNING)
-        if self._motors is not None:
-            outcome[self._motors.stalled[which]] = Status.STALLED
+        outcome[self._drive.stalled[which]] = Status.STALLED
         given = (task.numbers, self._job_time, self.force, which, demands, outcome, peaks, task.damage(peaks), period)
         call(settle, *given, *verdict, state, self.damage, report, reward)
         report["set_point"] = state["set_point"][which]
-        if self._motors is not None:
-            report["motor_torque"], report["motor_power"] = self._motors.told[which, 1:].T
+        self._drive.report(which, report)
         return StepResult(self._observe(which, cycles, period, generators), reward, report)
 
     def _run(self, which: Indices, count: int, generators: Generators) -> tuple[Cycles, Array, Array]:
@@ -233,26 +217,20 @@ class Jobs:
         Returns cycles, their growth, which is zero where it is not known, and the period (k,) [s].
         """
         speed = self._lowest[which] + self._span[which] * self.speed[which]
-        speeds = speed[:, None].repeat(count, axis=1)
-        if self._motors is not None:
-            speeds = self._motors.turn(which, speed, count, self.task.cycles_per_step)
-            self.state["speed"][which] = self._motors.told[which, 0]
-            speed = np.where(self._motors.stalled[which], speed, self.speed[which])
+        speeds = self._drive.turn(which, speed, count, self.task.cycles_per_step)
+        speed = self._drive.reached(which, speed, self.state)
         cycles, growth = self._moved(which, speeds, generators)
-        if self._motors is not None:
-            cycles.failed[:] |= self._motors.stalled[which]
-            for values in (*cycles[1:], growth):
-                values[cycles.failed] = 0
+        self._drive.stop(which, cycles, growth)
         cycles.peak_force[:] /= self.force[which][:, None, None]
         return cycles, growth, self.variants.nominal.period_at(speed)
 
     def _moved(self, which: Indices, speeds: Array, generators: Generators) -> tuple[Cycles, Array]:
         """Cycles of machines at speeds (k, cycles), and their growth."""
         task, count = self.task, speeds.shape[1]
-        steady = task.speed_ripple == 0.0 and self._motors is None
+        steady = task.speed_ripple == 0.0 and self._drive.steady
         if task.speed_ripple > 0.0:
             speeds *= 1.0 + task.speed_ripple * np.array([g.standard_normal(count) for g in generators])
-        if self._motors is not None:
+        if not self._drive.steady:
             call(round_speeds, speeds)
         kicks = None
         if task.kick > 0.0:
@@ -310,13 +288,6 @@ class Jobs:
         sensed_peaks = self.variants.nominal.sensed(cycles.peak_force)
         given = (task.numbers, which, self.demand, self.state, sensed_peaks, cycles.bounce_duration, period)
         call(observe, *given, *drawn, space.low, space.high, measured, values)
-        if self._monitor is not None:
-            for column in measured.T:
-                self._monitor.add(which, column, max(task.sensor_error, LEAST_ERROR))
-            values[:, self._places["monitor_level"]] = self._monitor.level(which)
-        if self._motors is not None:
-            values[:, self._places["set_point"]] = self.state["set_point"][which]
-        if self._records is not None:
-            self._records.add(which, self.speed[which], measured)
-            values[:, self._places["irregular_probability"]] = self._records.irregular_probability(which)
+        for entry in self._entries:
+            values[:, task.places[entry.name]] = entry.values(which, measured, self.state[which])
         return values

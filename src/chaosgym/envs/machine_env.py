@@ -19,7 +19,7 @@ from chaosgym.envs.drive import action_space, checked_actions
 from chaosgym.envs.jobs import Jobs
 from chaosgym.envs.levels import task_of, tolerances_of
 from chaosgym.envs.motors import refuse_drive
-from chaosgym.envs.observation import Observation, observation_names, observation_space
+from chaosgym.envs.observation import Observation, observation_space
 from chaosgym.envs.pool import ANY, SHARE, Pool, pool_task
 from chaosgym.envs.task import Status, Task, UnknownKeywordError, divided
 from chaosgym.envs.variants import OTHER_SIMULATOR, Variants
@@ -213,7 +213,7 @@ class MachineEnv(JobSpec, gym.Env[Observation, Any]):
         refuse_pictures(self.settings, render_mode)
         self.task, self.model = self.settings.task, self.settings.model
         self.nominal = self.settings.variants.nominal
-        self.observation_names = observation_names(self.task)
+        self.observation_names = tuple(self.task.places)
         self.observation_space = cast(Space[Observation], self.settings.space)
         self.action_space = cast(Space[Any], self.settings.actions)
         self._job = self.settings.jobs(1)

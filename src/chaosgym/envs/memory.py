@@ -18,7 +18,8 @@ from gymnasium.spaces import Box
 from numpy.typing import NDArray
 
 from chaosgym.arrays import Array
-from chaosgym.envs.observation import OBSERVATION_NAMES, Observation, observation_space
+from chaosgym.envs.kernels.steps import PLACE, REPEATS
+from chaosgym.envs.observation import Observation, observation_space
 from chaosgym.envs.task import Task
 
 PAST = 3
@@ -36,18 +37,17 @@ COMPARED = ("mean_peak_force", "impacts_per_cycle", "bouncing_share")
 LARGEST = 4.0
 """Deviations from the usual value are cut off here, in standard deviations."""
 
-_PLACE = {name: place for place, name in enumerate(OBSERVATION_NAMES)}
-_KEPT = [_PLACE[name] for name in KEPT]
-_COMPARED = [_PLACE[name] for name in COMPARED]
-_REPEATS = [_PLACE[name] for name in ("repeat_1", "repeat_2", "repeat_4")]
+_KEPT = [getattr(PLACE, name) for name in KEPT]
+_COMPARED = [getattr(PLACE, name) for name in COMPARED]
+_REPEATS = [place for place, _ in REPEATS]
 
 
 def irregularity(observations: NDArray[Any]) -> Array:
-    """Mean difference of peaks a period apart, (...) [N], least over periods 1, 2, 4, of observations (..., 14).
+    """Mean difference of peaks a period apart, (...) [N], least over periods 1, 2, 4, of observations (..., entries).
 
     Sensor errors of half width e alone make it 2 e / 3, whatever the period.
     """
-    scatter = 1.155 * observations[..., _PLACE["std_peak_force"]]
+    scatter = 1.155 * observations[..., PLACE.std_peak_force]
     return np.asarray(np.minimum(scatter, observations[..., _REPEATS].min(axis=-1)), dtype=float)
 
 
@@ -97,7 +97,7 @@ class SpeedMemory:
         self._past = np.zeros((count, PAST, len(KEPT)))
         self._last = np.zeros((count, len(KEPT)))
         self._sum, self._weight = np.zeros((count, len(COMPARED))), np.zeros((count, 1))
-        force = max(task.sensor_error, 1e-3 * task.load_rating)
+        force = max(task.sensor_error, 1e-3 * task.reference_force)
         self._floor = np.array([force / 3.0, 0.5, 0.005])
         self._noise = force
 
@@ -115,15 +115,15 @@ class SpeedMemory:
             values[jobs] = 0.0
 
     def add(self, observations: Observation) -> Observation:
-        """Take in the observations (N, 14) of a step; return them with what is remembered, (N, 14 + m)."""
+        """Take in the observations (N, entries) of a step; return them with what is remembered, (N, entries + m)."""
         return self.first(np.ones(len(observations), np.bool_), observations)
 
     def first(self, jobs: NDArray[np.bool_], observations: Observation) -> Observation:
-        """As ``add``, for the jobs that a mask (N,) marks: (k, 14 + m) for observations (N, 14)."""
+        """As ``add``, for the jobs that a mask (N,) marks: (k, entries + m) for observations (N, entries)."""
         every = np.flatnonzero(jobs)
         seen = observations[every].astype(float)
         top = self._felt.shape[1] - 1
-        place = np.rint((seen[:, 0] - self._lowest) / self._spacing).astype(np.int64).clip(0, top)
+        place = np.rint((seen[:, PLACE.speed] - self._lowest) / self._spacing).astype(np.int64).clip(0, top)
         felt = irregularity(seen)
         before = self._felt[every, place]
         self._felt[every, place] = np.where(self._seen[every, place] > 0.0, 0.5 * (before + felt), felt)
@@ -137,7 +137,7 @@ class SpeedMemory:
         weight = np.where(felt < 1.2 * self._noise, 1.0, 0.2)[:, None]
         self._sum[every] += weight * unusual
         self._weight[every] += weight
-        around = self._around(every, seen[:, _PLACE["demand"]])
+        around = self._around(every, seen[:, PLACE.demand])
         average = self._sum[every] / (self._weight[every] + 0.5)
         parts = (seen, self._past[every].reshape(len(seen), -1), *around, unusual, average)
         return np.concatenate(parts, axis=1).astype(np.float32)
@@ -157,7 +157,7 @@ def remembered_space(task: Task) -> Box:
     plain = observation_space(task)
     kept_low, kept_high = np.tile(plain.low[_KEPT], PAST), np.tile(plain.high[_KEPT], PAST)
     around, usual = 2 * REACH + 1, 2 * len(COMPARED)
-    force = plain.high[_PLACE["repeat_1"]]
+    force = plain.high[PLACE.repeat_1]
     low = [plain.low, np.minimum(kept_low, 0.0), np.zeros(around), np.full(around, -1.0), np.full(usual, -LARGEST)]
     high = [plain.high, kept_high, np.full(around, force), np.ones(around), np.full(usual, LARGEST)]
     return Box(np.concatenate(low).astype(np.float32), np.concatenate(high).astype(np.float32))

@@ -7,8 +7,8 @@ from gymnasium.spaces import Box
 from numpy.typing import NDArray
 
 from chaosgym.arrays import Array
+from chaosgym.envs.kernels.steps import PLACE
 from chaosgym.envs.task import Task
-from chaosgym.recordings.monitor import HIGHEST, LIMIT
 
 Observation = NDArray[np.float32]
 Generators = Sequence[np.random.Generator]
@@ -19,28 +19,11 @@ FORCE_RANGE = 5.0
 IMPACT_RANGE = 200.0
 """Impacts a cycle at which the counter saturates."""
 
-COMMANDED = ("speed", "demand", "trim", "offset", "remaining_share", "steps_since_change")
-FELT = (
-    "mean_peak_force",
-    "std_peak_force",
-    "max_peak_force",
-    "repeat_1",
-    "repeat_2",
-    "repeat_4",
-    "impacts_per_cycle",
-    "bouncing_share",
-)
-OBSERVATION_NAMES = (*COMMANDED, *FELT)
-"""Entries of an observation, in their order."""
+OBSERVATION_NAMES = PLACE._fields
+"""Entries of every observation, in their order."""
 
-ASKED = {
-    "monitor": ("on", "monitor_level"),
-    "drive": ("motor", "set_point"),
-    "classifier": ("on", "irregular_probability"),
-}
-"""Entries that follow where a keyword has this value: the level of the monitor, an alarm above 1; the speed at
-which the motor gives no torque; and how likely the machine's trained classifier of records holds the motion at this
-speed irregular."""
+FELT = OBSERVATION_NAMES[PLACE.mean_peak_force :]
+"""Those that sensors report."""
 
 OVERSPEED = 2.0
 """Largest speed that is observed under a motor, which a load may drive beyond its set-point, over the highest one."""
@@ -64,31 +47,26 @@ MEANINGS = {
 """What each entry is; speeds are in the unit of the machine."""
 
 
-def observation_names(task: Task) -> tuple[str, ...]:
-    """Return the entries of an observation of a task."""
-    return (*OBSERVATION_NAMES, *(ASKED[keyword][1] for keyword in asked_of(task)))
-
-
-def asked_of(task: Task) -> tuple[str, ...]:
-    """Return the keywords of the entries that a task adds, in their order."""
-    return tuple(keyword for keyword in ASKED if getattr(task, keyword) == ASKED[keyword][0])
-
-
 def observation_space(task: Task) -> Box:
-    """Return the space of observations, (14,) and one more for each keyword of ``ASKED``, with finite bounds."""
-    span, force = task.highest_speed - task.lowest_speed, FORCE_RANGE * task.load_rating
-    trim = span if task.action == "speed" else task.largest_trim
+    """Return the space of observations, a number for each of ``task.places``, with finite bounds."""
     slowest, fastest = task.lowest_speed, task.highest_speed
+    span = fastest - slowest
+    trim = span if task.action == "speed" else task.largest_trim
     if task.drive == "motor":
-        slowest, fastest = 0.0, OVERSPEED * fastest
-        span = fastest
-    low = [slowest, task.lowest_demand, -trim, -span, 0.0, 0.0] + [0.0] * len(FELT)
-    high = [fastest, task.highest_demand, trim, span, 1.0, float(task.shortest_hold)]
-    high += [force] * (len(FELT) - 2) + [IMPACT_RANGE, 1.0]
-    most = {"monitor": HIGHEST / LIMIT, "drive": task.highest_speed, "classifier": 1.0}
-    asked = [most[keyword] for keyword in asked_of(task)]
-    low, high = low + [0.0] * len(asked), high + asked
-    return Box(np.array(low, np.float32), np.array(high, np.float32))
+        slowest, span, fastest = 0.0, fastest, OVERSPEED * fastest
+    bounds = dict.fromkeys(FELT, (0.0, FORCE_RANGE * task.reference_force)) | {
+        "speed": (slowest, fastest),
+        "demand": (task.lowest_demand, task.highest_demand),
+        "trim": (-trim, trim),
+        "offset": (-span, span),
+        "remaining_share": (0.0, 1.0),
+        "steps_since_change": (0.0, float(task.shortest_hold)),
+        "impacts_per_cycle": (0.0, IMPACT_RANGE),
+        "bouncing_share": (0.0, 1.0),
+    }
+    bounds |= {entry.name: entry.bounds(task) for entry in task.added}
+    low, high = np.array([bounds[name] for name in task.places], np.float32).T
+    return Box(low.copy(), high.copy())
 
 
 def sensed(task: Task, impacts: NDArray[np.int64], generators: Generators) -> tuple[Array, NDArray[np.int64]]:

@@ -114,7 +114,7 @@ class Pool:
 def pool_task() -> Task:
     """Task of any machine: speeds are shares of its range, forces of its rated force; as that of a file of one's own.
 
-    Whoever follows the demand uses up as much of a life in a job as on the beam.
+    Whoever follows the demand has as much damage in a job as on the beam.
     """
     return Task(
         lowest_speed=0.0,
@@ -130,5 +130,5 @@ def pool_task() -> Task:
         deviation_weight=3.5,
         speed_ripple=0.002,
         sensor_error=0.0125,
-        load_rating=1.0,
+        reference_force=1.0,
     )

@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 
 from chaosgym.arrays import Array
 from chaosgym.envs.jobs import Segment
-from chaosgym.envs.observation import OBSERVATION_NAMES
+from chaosgym.envs.kernels.steps import PLACE
 from chaosgym.envs.task import Task
 from chaosgym.machines.machine import Machine
 from chaosgym.machines.parameters import parameters_of
@@ -32,7 +32,6 @@ DOTS_PER_INCH = 100
 RENDER_SAMPLES = 8000
 """Samples of the motion kept of a step."""
 
-MEAN_PEAK = OBSERVATION_NAMES.index("mean_peak_force")
 
 STROBE = 12
 """Each step is shown at a moment of its last cycle, this fraction of a cycle later than the step before: every step
@@ -114,7 +113,7 @@ class Dashboard:
         """Take in a step."""
         self._speeds.append(float(info["speed"]))
         self._demands.append(float(info["demand"]))
-        self._peaks.append(float(observation[MEAN_PEAK]))
+        self._peaks.append(float(observation[PLACE.mean_peak_force]))
         self._wild.append(bool(info["type_iii"] > 0.5))
 
     def draw(self, record: CycleRecord) -> Frame | None:
@@ -168,8 +167,8 @@ class Dashboard:
             panel.set_xlabel(across, fontsize=8, color=INK)
             panel.set_ylabel(up, fontsize=8, color=INK)
         for axis in (self._force, self._job):
-            axis.axhline(task.load_rating, color=LIMIT, linewidth=1.0, linestyle="--")
-        self._force.axhline(-task.load_rating, color=LIMIT, linewidth=1.0, linestyle="--")
+            axis.axhline(task.reference_force, color=LIMIT, linewidth=1.0, linestyle="--")
+        self._force.axhline(-task.reference_force, color=LIMIT, linewidth=1.0, linestyle="--")
         self._force.set_xlim(0, task.cycles_per_step)
         self._job.set_xlim(0, task.job_cycles)
         margin = 0.05 * (task.highest_speed - task.lowest_speed)
@@ -208,7 +207,7 @@ class Dashboard:
                 1.1 * float(np.abs(room[np.isfinite(room)]).max()), 1e3 * float(np.abs(samples[:, 0]).max())
             ),
             "velocity": float(np.abs(samples[:, 1]).max()),
-            "force": max(self._task.load_rating, float(np.abs(samples[:, 2]).max()), *self._peaks[-1:]),
+            "force": max(self._task.reference_force, float(np.abs(samples[:, 2]).max()), *self._peaks[-1:]),
         }
         beyond = {name: value for name, value in reached.items() if value > self._limits[name]}
         if not beyond:
@@ -239,7 +238,7 @@ class Dashboard:
         for artist in (*panel.lines, *panel.collections, *panel.patches, *panel.texts):
             artist.remove()
         moment = (len(self._speeds) % STROBE) / STROBE
-        record.machine.draw(panel, record, colour, moment, self._task.load_rating)
+        record.machine.draw(panel, record, colour, moment, self._task.reference_force)
         staying = [text.get_text() for text in self._texts(stays=True)]
         if staying != self._staying:
             self._staying, self._background = staying, None

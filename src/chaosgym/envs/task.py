@@ -10,8 +10,13 @@ A step of a job costs
 
 The keyword ``objective`` names a set of these weights, ``OBJECTIVES``: irregular motion, the joint's life, or both.
 
-A step not done costs more than a bad one, so giving up never pays. Damage follows the basic rating life of a bearing
-(``life_law``), p = 10/3 for line contact; the damage of a joint is that of its worse surface.
+A step not done costs more than a bad one, so giving up never pays. Damage adds up peak forces as the basic rating life
+of a bearing does, to the power of p = 10/3 (line contact); that of a joint is its worse surface's:
+
+    D = D_0 / n  sum (F_i / F_0)^p              n cycles of a job, ``reference_force`` F_0, ``reference_damage`` D_0
+
+It is a scale of cost, and needs no load rating: F_0 and D_0 stand in it as D_0 / F_0^p alone, so that lives compare as
+damages do whatever they are. For a life in hours state a rating (``chaosgym run-agent --load-rating``).
 
 References
 ----------
@@ -29,6 +34,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from chaosgym.arrays import Array
+from chaosgym.envs.entries import AddedEntries
 from chaosgym.envs.kernels import steps
 from chaosgym.errors import ParameterError
 from chaosgym.machines.machine import Machine
@@ -50,7 +56,7 @@ class Status(IntEnum):
 
 
 @dataclass(frozen=True, kw_only=True)
-class Task:
+class Task(AddedEntries):
     """Drive, demand, sensors, disturbance and weights of a task; speeds are in the unit of the machine's speed field.
 
     Raises
@@ -68,12 +74,6 @@ class Task:
     highest_speed: float = _number(30.0, source="highest speed of the drive")
     slew_limit: float = _number(2.0, source="largest change of speed in a step")
     speed_grid: float = _number(0.0, source="spacing of the speeds that the drive can hold, 0 for none")
-    drive: str = parameter(
-        "constant",
-        choices=("constant", "motor"),
-        provenance="assumed",
-        source="whether the machine has the speed that is set, or its motor's torque takes it there",
-    )
     trim_step: float = _number(0.25, source="smallest change of the trim")
     largest_trim: float = _number(2.0, source="largest trim")
     lowest_demand: float = _number(18.0, source="lowest demand")
@@ -87,15 +87,6 @@ class Task:
     sensor_error: float = _number(1.0, unit="N", source="half width of the error of a measured peak force")
     bouncing_error: float = _number(0.05, source="half width of the error of the share of bouncing")
     missed_impacts: float = _number(0.05, high=1.0, source="share of the impacts that the counter misses")
-    monitor: str = parameter(
-        "off", choices=("off", "on"), provenance="assumed", source="whether the monitor's level is observed too"
-    )
-    classifier: str = parameter(
-        "off",
-        choices=("off", "on"),
-        provenance="assumed",
-        source="whether it is observed how likely the trained classifier of records holds the motion irregular",
-    )
     speed_ripple: float = _number(0.0, high=0.1, source="standard deviation of a cycle's speed, as a share of it")
     kick: float = _number(
         0.0, high=0.1, source="standard deviation of the change of each velocity once a cycle, as a share of its range"
@@ -103,16 +94,16 @@ class Task:
     wear: float = _number(0.0, high=10.0, source="growth of the clearance over the job, as a share of it")
     type_iii_weight: float = _number(1.0, source="cost of a step that is irregular throughout")
     deviation_weight: float = _number(0.25, source="cost of a step at a speed by 1 from the demand")
-    damage_weight: float = _number(1.0, source="cost of a life of the joint")
+    damage_weight: float = _number(1.0, source="cost of a damage of 1")
     time_weight: float = _number(0.0, source="cost of the time that the job takes at top speed")
     failure_weight: float = _number(2.0, source="cost of each step that is not done")
     cost_budget: float = _number(
         0.05, high=1.0, source="mean cost of a step that a constrained agent may have; no part of the reward"
     )
-    load_rating: float = _number(
-        100.0, low=1e-6, unit="N", source="peak force under which a job uses up the life_share of a joint"
+    reference_force: float = _number(
+        100.0, low=1e-6, unit="N", source="peak force of a job with the reference_damage; no load rating"
     )
-    life_share: float = _number(0.5, source="share of its life that a joint loses in a job under the load_rating")
+    reference_damage: float = _number(0.5, source="damage of a job whose peaks are all the reference_force; 1 ends it")
 
     def __post_init__(self) -> None:
         validate(self)
@@ -143,21 +134,21 @@ class Task:
         return self.steps * self.cycles_per_step
 
     def damage(self, peak_force: Array) -> Array:
-        """Share of its life that each surface uses up, (..., sides), by peak forces (..., cycles, sides) [N]."""
-        shares: Array = damage_in_a_million(peak_force, self.load_rating).sum(axis=-2)
-        return shares * (self.life_share / self.job_cycles)
+        """Damage of each surface, (..., sides), by peak forces (..., cycles, sides) [N]: 1 ends a job."""
+        shares: Array = damage_in_a_million(peak_force, self.reference_force).sum(axis=-2)
+        return shares * (self.reference_damage / self.job_cycles)
 
     @cached_property
     def numbers(self) -> NDArray[np.void]:
-        """One record of all fields for the kernels, with a choice as its place among the choices."""
+        """One record of all numbers for the kernels, with the kind of action as its place among the choices."""
         about = parameters_of(self)
-        given = {name: getattr(self, name) for name in about}
-        values = [about[name].choices.index(value) if about[name].choices else value for name, value in given.items()]
-        return np.array([tuple(values)], [(name, type(value)) for name, value in zip(about, values, strict=True)])
+        values = {name: getattr(self, name) for name in about if not about[name].choices}
+        values["action"] = about["action"].choices.index(self.action)
+        return np.array([tuple(values.values())], [(name, type(value)) for name, value in values.items()])
 
 
 LIFE_PRICE = 1000.0
-"""Cost of a life of the joint where life counts (assumed): on the beam it is worth 33 jobs at 1 Hz off the demand."""
+"""Cost of a damage of 1 where life counts (assumed): on the beam it is worth 33 jobs at 1 Hz off the demand."""
 
 OBJECTIVES: Mapping[str, Mapping[str, float]] = {
     "irregular": {},

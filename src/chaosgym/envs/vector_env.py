@@ -19,7 +19,7 @@ from chaosgym.arrays import Indices
 from chaosgym.envs import environment
 from chaosgym.envs.drive import checked_actions
 from chaosgym.envs.machine_env import METADATA, EnvSettings, JobSpec, refuse_pictures, start_of
-from chaosgym.envs.observation import Observation, observation_names
+from chaosgym.envs.observation import Observation
 from chaosgym.envs.task import Status
 from chaosgym.errors import ParameterError
 
@@ -94,7 +94,7 @@ class MachineVectorEnv(JobSpec, gym.vector.VectorEnv[Observation, Actions, NDArr
         refuse_pictures(self.settings, render_mode)
         self.task, self.model = self.settings.task, self.settings.model
         self.nominal = self.settings.variants.nominal
-        self.observation_names = observation_names(self.task)
+        self.observation_names = tuple(self.task.places)
         self.jobs = self.settings.jobs(num_envs)
         self.render_mode = render_mode
         self.jobs.traced = 0 if render_mode is None else min(num_envs, DRAWN)

@@ -183,8 +183,14 @@ def view_of(machine: Machine) -> View:
         peaks=judged.peak_force[:, judged.worst_side],
         room=machine.room_of(judged.joint),
         nature=verdict.nature,
-        headline=f"{verdict.words} ({verdict.status})",
-        lines=(verdict.reason, *_beside(machine, verdict), _votes(verdict), _classified(machine), _watched(heard)),
+        headline=verdict.statement.headline,
+        lines=(
+            *verdict.statement.lines()[1:],
+            *_beside(machine, verdict),
+            _votes(verdict),
+            _classified(machine),
+            _watched(heard),
+        ),
         sketch=machine.sketch(last, rows, float(np.abs(motion[:, 2]).max()) or 1.0),
         span=sketched * machine.cycle_period,
     )

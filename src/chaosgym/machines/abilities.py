@@ -1,6 +1,5 @@
 """What only some machines can do or tell; the defaults are the answers of all others."""
 
-import math
 from collections.abc import Mapping
 from typing import TYPE_CHECKING, Any, ClassVar, NamedTuple, Self
 
@@ -11,7 +10,6 @@ from chaosgym.arrays import Array
 from chaosgym.errors import ParameterError
 
 if TYPE_CHECKING:
-    from chaosgym.machines.batch import CompiledBatch
     from chaosgym.machines.drive_torque import DriveTorque
     from chaosgym.machines.picture import Sketch
 
@@ -37,40 +35,11 @@ class Flexible(NamedTuple):
     drive: NDArray[np.float64]
     static: NDArray[np.float64]
 
-    def passive_share(
-        self, springs: Array, dampers: Array, stops: Array, period: float, states: Array, peak_force: Array
-    ) -> float:
-        """Largest ratio of energy and force of a run from rest to their bounds, as ``Machine.share_of_bound``.
-
-        Neither structure nor contact gives energy: only the drive does, and what preloads or offsets have stored. So
-        the root of twice the energy grows by at most the norm of the modal forces a second.
-
-        Parameters
-        ----------
-        springs, dampers, stops : (m, 2)
-            Of the upper and the lower surface of each joint [N/m], [N s/m]; their positions [m].
-        period
-            Of a cycle [s].
-        """
-        n = len(self.stiffness)
-        energy = np.sum(states[:, n : 2 * n] ** 2 + self.stiffness * states[:, :n] ** 2, axis=1)
-        load = float(np.sum(np.linalg.norm(self.drive, axis=(1, 2)))) + float(np.linalg.norm(self.static))
-        inside = np.maximum(np.stack([-stops[:, 0], stops[:, 1]], axis=1), 0.0)
-        stored = math.sqrt(float(np.sum(springs * inside**2)))
-        speed = stored + load * np.arange(1, len(states)) * period
-        if not speed.any():
-            return 0.0 if not energy.any() and not peak_force.any() else math.inf
-        surface = np.sqrt(springs) + dampers * np.linalg.norm(self.joints, axis=1)[:, None]
-        forces = peak_force / (surface.ravel() * speed[:, None])
-        return max(float(np.max(np.sqrt(energy[1:]) / speed)), float(np.max(forces)))
-
 
 class Abilities:
     """Optional part of the protocol ``Machine``."""
 
     name: ClassVar[str]
-    runs_in_exudyn: ClassVar[bool] = False
-    """Whether it has a batch in another simulator, ``exudyn_batch``."""
 
     @property
     def carries_deviations(self) -> bool:
@@ -227,15 +196,3 @@ class Abilities:
             If it has no such picture.
         """
         raise ParameterError(f"{self.name} has no picture of its links; allowed: the file of a mechanism")
-
-    def exudyn_batch(self, count: int) -> "CompiledBatch":
-        """Return ``count`` variants that move in Exudyn.
-
-        Raises
-        ------
-        ParameterError
-            If the machine has none.
-        ChaosgymError
-            If Exudyn is not installed.
-        """
-        raise ParameterError(f"{self.name} does not run in Exudyn; allowed: impact-beam")

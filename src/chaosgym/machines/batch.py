@@ -10,7 +10,7 @@ They differ in numbers, not in their joints or in how many modes they have. Each
 """
 
 from abc import ABC, abstractmethod
-from typing import TYPE_CHECKING, Any, NamedTuple
+from typing import Any, NamedTuple, Protocol
 
 import numpy as np
 from numpy.typing import NDArray
@@ -23,8 +23,32 @@ from chaosgym.core.cycle import CycleArrays
 from chaosgym.core.varied import advance_varied_beams
 from chaosgym.machines.integrators import ExactEvents
 
-if TYPE_CHECKING:
-    from chaosgym.machines.machine import Machine
+
+class BatchedMachine(Protocol):
+    """What a batch asks of a machine; see ``Machine``."""
+
+    @property
+    def n_states(self) -> int:
+        """Numbers of its state."""
+        ...
+
+    @property
+    def n_velocities(self) -> int:
+        """Those of them that are velocities."""
+        ...
+
+    @property
+    def joints(self) -> tuple[str, ...]:
+        """Names of its joints; none if it has one."""
+        ...
+
+    def arrays(self, cycles: int, samples: int = 0) -> CycleArrays:
+        """Return the arrays into which cycles are written."""
+        ...
+
+    def reduce(self) -> Any:
+        """Return the model that the kernels integrate."""
+        ...
 
 
 class Cycles(NamedTuple):
@@ -57,7 +81,7 @@ class CompiledBatch(ABC):
     ``change``, ``set_speeds``, ``set_clearances`` and ``_advance`` know their kind.
     """
 
-    def __init__(self, machine: "Machine", count: int) -> None:
+    def __init__(self, machine: BatchedMachine, count: int) -> None:
         integrator = ExactEvents()
         self._settings = Settings(integrator.step_phase, integrator.event_tolerance, integrator.event_budget)
         self._machine = machine
@@ -69,7 +93,7 @@ class CompiledBatch(ABC):
     def __len__(self) -> int:
         return len(self._motions.bouncing)
 
-    def start(self, i: int, machine: "Machine") -> None:
+    def start(self, i: int, machine: BatchedMachine) -> None:
         """Put a machine at rest into place i."""
         self._motions.coordinates[i] = 0.0
         self._motions.bouncing[i] = 0.0
@@ -114,7 +138,7 @@ class CompiledBatch(ABC):
             values[which] = values[i]
 
     @abstractmethod
-    def change(self, i: int, machine: "Machine") -> None:
+    def change(self, i: int, machine: BatchedMachine) -> None:
         """Put another machine into place i, whose motion goes on."""
 
     @abstractmethod
@@ -141,11 +165,11 @@ class KickedBatch(CompiledBatch):
 class VaryingBatch(CompiledBatch):
     """Machines that take along a small deviation each, at a speed that may change from cycle to cycle."""
 
-    def __init__(self, machine: "Machine", count: int) -> None:
+    def __init__(self, machine: BatchedMachine, count: int) -> None:
         super().__init__(machine, count)
         self._deviations = np.ones((count, 1, machine.n_states))
 
-    def start(self, i: int, machine: "Machine") -> None:
+    def start(self, i: int, machine: BatchedMachine) -> None:
         """Put a machine at rest into place i."""
         super().start(i, machine)
         self._deviations[i] = np.cos(1.0 + np.arange(self._deviations.shape[2]))
@@ -173,7 +197,7 @@ class VaryingBatch(CompiledBatch):
 class ModalImpactBatch(VaryingBatch):
     """Machines of a few modes and one gap; those that share a structure share its tables."""
 
-    def __init__(self, machine: "Machine", count: int) -> None:
+    def __init__(self, machine: BatchedMachine, count: int) -> None:
         super().__init__(machine, count)
         model = machine.reduce()
         self._batch, self._regimes, self._tables = (stacked([part] * count) for part in _parts(model))
@@ -190,7 +214,7 @@ class ModalImpactBatch(VaryingBatch):
         vars(self).update(state)
         self._tables = self._tables._replace(address=np.array([values.ctypes.data for values in self._values]))
 
-    def change(self, i: int, machine: "Machine") -> None:
+    def change(self, i: int, machine: BatchedMachine) -> None:
         """Put another machine into place i, whose motion goes on."""
         model = machine.reduce()
         for batch, part in zip((self._batch, self._regimes, self._tables), _parts(model), strict=True):

@@ -102,8 +102,6 @@ class Machine(Abilities, ABC):
     """Fields by other names, those of the only joint: ``joint.stiffness`` for ``contact_stiffness``."""
     scenes: ClassVar[Mapping[str, Mapping[str, Any]]] = {"as it is": {}}
     """Scenes whose cost the trade-off shows: the fields in which they differ from the default."""
-    extremes: ClassVar[Mapping[str, Mapping[str, Any]]] = {}
-    """Ends of what is admissible, by the fields that they set, at which the stability map runs the machine."""
 
     stated_state: ClassVar[tuple[float, ...]] = ()
     """Initial state that its file states, in SI units; rest in the middle of the gap if empty."""
@@ -221,18 +219,6 @@ class Machine(Abilities, ABC):
         -------
         (status, cycles)
             One of ``core.status``, and the number of cycles that were finished.
-        """
-
-    @abstractmethod
-    def share_of_bound(self, states: Array, peak_force: Array) -> float:
-        """Largest ratio of a run from rest to the bound that physics sets to it; at most 1 but for rounding.
-
-        Parameters
-        ----------
-        states : (cycles + 1, n_states)
-            States at the beginning of each cycle, and at the end.
-        peak_force : (cycles, sides)
-            Peak forces [N].
         """
 
     @property

@@ -6,6 +6,7 @@ A file with links is a mechanism; any other one is a structure of modes or matri
 import hashlib
 import json
 from collections.abc import Mapping
+from dataclasses import fields
 from importlib import resources
 from pathlib import Path
 from types import ModuleType
@@ -61,10 +62,29 @@ def machine_class(path: str | Path) -> type[Machine]:
             digest.update(_bytes(beside))
         key = f"{path} {digest.hexdigest()}"
         if key not in _classes:
-            _classes[key] = reader.built(str(path), digest.hexdigest()[:16], data, folder)
+            kind = reader.built(str(path), digest.hexdigest()[:16], data, folder)
+            kind.__reduce__ = _reduced
+            _classes[key] = kind
         return _classes[key]
     except ParameterError as error:
         raise ParameterError(f"{path}: {error}") from None
+
+
+def _reduced(machine: Any) -> Any:
+    """How a machine is pickled: by the name of its file, whose class has no name of its own."""
+    kind = type(machine)
+    values = {each.name: getattr(machine, each.name) for each in fields(machine)}
+    # what is the file's own comes back with it
+    own = {name: value for name, value in values.items() if value is not getattr(kind, name, None)}
+    return _restored, (machine.name, {**own, "definition": machine.definition}, machine.initial_state)
+
+
+def _restored(path: str, values: Mapping[str, Any], initial_state: tuple[float, ...]) -> Machine:
+    kind: Any = machine_class(path)
+    if kind.definition != values["definition"]:
+        raise ParameterError(f"{path} has changed: it is not the machine that was kept")
+    machine: Machine = kind(**values)
+    return machine.from_state(initial_state)
 
 
 def read_machine(path: str | Path) -> Machine:

@@ -18,7 +18,7 @@ from numpy.polynomial import chebyshev
 
 from chaosgym.arrays import Array
 from chaosgym.core.modal_model import ModalImpactModel, Regimes
-from chaosgym.machines.modal_impact import with_tables
+from chaosgym.machines.flexible_model import with_tables
 
 CONVERGED = 1e-9
 """Last coefficients of a polynomial, as a share of the largest number of an array."""

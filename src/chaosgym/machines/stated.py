@@ -1,7 +1,7 @@
-"""What a file or a call states of a kind of machine: its class, ranges, tolerances, and how its machines are kept."""
+"""What a file or a call states of a kind of machine: its class, ranges and tolerances."""
 
 from collections.abc import Iterable, Mapping
-from dataclasses import dataclass, fields
+from dataclasses import dataclass
 from typing import Any, ClassVar, get_type_hints
 
 from chaosgym.errors import ParameterError
@@ -79,25 +79,6 @@ def flat(given: Mapping[str, Any]) -> dict[str, Any]:
         inner = flat(value) if isinstance(value, dict) else {"": value}
         found |= {f"{key}.{name}" if name else key: each for name, each in inner.items()}
     return found
-
-
-def reduced(machine: Any) -> Any:
-    """How a machine is pickled: by the name of its file, whose class has no name of its own."""
-    kind = type(machine)
-    values = {each.name: getattr(machine, each.name) for each in fields(machine)}
-    # what is the file's own comes back with it
-    own = {name: value for name, value in values.items() if value is not getattr(kind, name, None)}
-    return _restored, (machine.name, {**own, "definition": machine.definition}, machine.initial_state)
-
-
-def _restored(path: str, values: Mapping[str, Any], initial_state: tuple[float, ...]) -> Machine:
-    from chaosgym.machines.machine_file import machine_class
-
-    kind: Any = machine_class(path)
-    if kind.definition != values["definition"]:
-        raise ParameterError(f"{path} has changed: it is not the machine that was kept")
-    machine: Machine = kind(**values)
-    return machine.from_state(initial_state)
 
 
 def state_of(operation: Mapping[str, Any], machine: Machine) -> tuple[float, ...]:

@@ -16,8 +16,8 @@ from matplotlib.figure import Figure
 from chaosgym.arrays import Array
 from chaosgym.branches.bifurcation_diagram import BifurcationDiagram
 from chaosgym.branches.bifurcation_map import BifurcationMap
+from chaosgym.design.design_study import DesignStudy
 from chaosgym.design.measured import MeasuredPeaks
-from chaosgym.design.study import DesignStudy
 from chaosgym.diagnosis.verdict import MachineDiagnosis
 from chaosgym.fit.overlay import Overlay
 from chaosgym.machines import Machine
@@ -141,21 +141,8 @@ def diagnosis_figure(verdict: MachineDiagnosis) -> Figure:
     worst = judged.worst_side
     response.cycle_points(judged.peak_force[:, worst], peaks, first=first, color=colour)
     peaks.set_ylabel(f"peak force, {machine.sides[worst]} [N]")
-    figure.suptitle(f"{point_of(machine, judged.joint_name)}\n{_told(verdict)}", **TITLE)
+    figure.suptitle(f"{point_of(machine, judged.joint_name)}\n{verdict.statement.headline}", **TITLE)
     return figure
-
-
-def _told(verdict: Diagnosis) -> str:
-    """Nature, period and the exponent or the certificate, in one line."""
-    if verdict.status == "certified":
-        return f"{verdict.words}: proven"
-    exponent = verdict.evidence.get("largest_lyapunov_exponent_per_cycle")
-    if exponent is None:
-        return f"{verdict.words} (margin {verdict.margin:.2f})"
-    return (
-        f"{verdict.words} ({verdict.status}): exponent {exponent['value']:.2f} "
-        f"± {exponent['standard_error']:.2f} per cycle"
-    )
 
 
 @_styled
@@ -170,7 +157,7 @@ def measured_figure(peaks: Array, verdict: Diagnosis, title: str, unit: str = "N
         over.set_ylabel(f"reading [{unit}]")
         mapped.set_xlabel(f"reading of a cycle [{unit}]")
         mapped.set_ylabel(f"of the next [{unit}]")
-    figure.suptitle(f"{title}\n{_told(verdict)}", **TITLE)
+    figure.suptitle(f"{title}\n{verdict.statement.headline}", **TITLE)
     return figure
 
 
@@ -250,7 +237,7 @@ def classified_figure(runs: Sequence[tuple[str, Array, Diagnosis, dict[str, floa
     rows = figure.subplots(len(runs), 2, squeeze=False, width_ratios=(2, 1))
     for (left, right), (name, peaks, verdict, chances) in zip(rows, runs, strict=True):
         response.cycle_points(peaks, left, color=NATURE_COLOURS[verdict.nature])
-        left.set_title(f"{name}: {_told(verdict)}", fontsize=9.5)
+        left.set_title(f"{name}: {verdict.statement.headline}", fontsize=9.5)
         if chances:
             response.chance_bars(chances, right)
             right.set_title("classifier", fontsize=9.5)
@@ -271,7 +258,9 @@ def peaks_figure(measured: MeasuredPeaks) -> Figure:
         f"{value:,.0f}" if value >= 100.0 else f"{value:.3g}"
         for value in (found.life, found.life_interval.low, found.life_interval.high)
     )
-    figure.suptitle(f"Life {life} million cycles ({low} to {high})", **TITLE)
+    rated = measured.criteria.load_rating is not None
+    title = f"Life {life} million cycles ({low} to {high})" if rated else f"Equivalent force {found.force:.1f} N"
+    figure.suptitle(title, **TITLE)
     left.set_title("")
     return figure
 

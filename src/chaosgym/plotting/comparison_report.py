@@ -6,11 +6,11 @@ from functools import partial
 import numpy as np
 
 from chaosgym.design.bearing import hours_of
+from chaosgym.design.design_study import DesignStudy
 from chaosgym.design.fatigue import equivalent_force
 from chaosgym.design.measured import MeasuredPeaks
 from chaosgym.design.methodology import Assessment
-from chaosgym.design.study import DesignStudy
-from chaosgym.design.told import hours_told, listed, percent_told, share_told
+from chaosgym.design.told import NOT_ASKED, hours_told, listed, percent_told, share_told
 from chaosgym.machines.parameters import parameters_of, quantity_of
 from chaosgym.plotting import design as figures
 from chaosgym.plotting.design_report import HEADLINES, drawn_by, picture_of, rendered, tolerance_told
@@ -58,7 +58,8 @@ def comparison_rows(studies: Mapping[str, DesignStudy], measured: MeasuredPeaks 
     columns = [_column(study) for study in studies.values()]
     if measured is not None:
         columns.append(_measured_column(measured, next(iter(studies.values()))))
-    return {name: [column.get(name, NOTHING) for column in columns] for name in columns[0]}
+    names = dict.fromkeys(name for column in columns for name in column)
+    return {name: [column.get(name, NOTHING) for column in columns] for name in names}
 
 
 def agreement(studies: Mapping[str, DesignStudy], measured: MeasuredPeaks) -> str:
@@ -87,6 +88,13 @@ def _column(study: DesignStudy) -> dict[str, str]:
     best = study.improvement.best if study.improvement else None
     meeting = study.combination.meeting
     forces = _forces(found)
+    rated, asked = found.criteria.load_rating is not None, found.criteria
+    required = hours_told(hours_of(asked.life, period)) if asked.life is not None else NOT_ASKED
+    lasts = hours_told(hours_of(value.life_interval.low, period)) if rated else NOT_ASKED
+    probable = NOT_ASKED
+    if meeting is not None:
+        probable = f"{percent_told(meeting.share)} ({percent_told(meeting.low)} to {percent_told(meeting.high)})"
+    suffices = "none needed" if study.improvement is None else best.told if best else "none"
     return {
         "verdict": HEADLINES[found.verdict][1],
         "machine": machine.name,
@@ -95,17 +103,16 @@ def _column(study: DesignStudy) -> dict[str, str]:
         "nominal response": found.nominal.nature,
         "type over the tolerances": found.type,
         "machines in the tolerances": found.series.told.partition(" of ")[0],
-        "life in operation": hours_told(hours_of(value.life_interval.low, period)),
-        "life required": hours_told(hours_of(found.criteria.life, period)),
+        "life in operation": lasts,
+        "life required": required,
         "reliability": share_told(value.reliability_interval.low),
         "mean peak force, nominal": f"{np.mean(found.nominal.worse_side(exponent)):.1f} N",
         "largest peak force": f"{value.largest_force:.1f} N",
         "equivalent force": f"{value.force:.1f} N",
         "equivalent force of each machine": f"{min(forces):.1f} to {max(forces):.1f} N",
-        "load rating needed": f"{value.required_load_rating:.0f} N",
-        "probability of meeting life and reliability": f"{percent_told(meeting.share)} "
-        f"({percent_told(meeting.low)} to {percent_told(meeting.high)})",
-        "cheapest change that suffices": "none needed" if study.improvement is None else best.told if best else "none",
+        "load rating needed": NOT_ASKED if asked.life is None else f"{value.required_load_rating:.0f} N",
+        "probability of meeting what is required": probable,
+        "cheapest change that suffices": suffices if found.checks else NOT_ASKED,
     }
 
 
@@ -117,14 +124,16 @@ def _measured_column(measured: MeasuredPeaks, study: DesignStudy) -> dict[str, s
         "machine": measured.source.get("file", MEASURED),
         "nominal response": measured.verdict.diagnosis.nature,
         "life in operation": hours_told(hours_of(value.life_interval.low, period)),
-        "life required": hours_told(hours_of(found.criteria.life, period)),
+        "life required": NOT_ASKED
+        if found.criteria.life is None
+        else hours_told(hours_of(found.criteria.life, period)),
         "mean peak force, nominal": f"{np.mean(measured.peaks):.1f} N",
         "largest peak force": f"{value.largest_force:.1f} N",
         "equivalent force": f"{value.force:.1f} N",
-        "load rating needed": f"{value.required_load_rating:.0f} N",
+        "reliability": share_told(value.reliability_interval.low),
     }
-    if measured.strength_stated:
-        told["reliability"] = share_told(value.reliability_interval.low)
+    if found.criteria.life is not None:
+        told["load rating needed"] = f"{value.required_load_rating:.0f} N"
     return told
 
 
@@ -138,8 +147,7 @@ def _differing(studies: Mapping[str, DesignStudy]) -> dict[str, list[str]]:
             for name in parameters_of(found.machine)
         }
         columns.append(
-            column
-            | {name: quantity_of(found.criteria, name) for name in parameters_of(found.criteria) if name != "life"}
+            column | {name: quantity_of(found.criteria, name) for name in found.criteria.asked if name != "life"}
         )
     names = dict.fromkeys(name for column in columns for name in column)
     table = {name: [column.get(name, NOTHING) for column in columns] for name in names}

@@ -11,8 +11,9 @@ from matplotlib.patches import Patch, Rectangle
 from scipy import stats
 
 from chaosgym.arrays import Array
+from chaosgym.design.bearing import STRENGTH
 from chaosgym.design.combination import Combination
-from chaosgym.design.fatigue import equivalent_force, statistical_life
+from chaosgym.design.fatigue import equivalent_force, rating_life
 from chaosgym.design.improve import Improvement
 from chaosgym.design.methodology import Assessment
 from chaosgym.design.peak_impacts import PeakImpactDiagram
@@ -157,12 +158,13 @@ def drive_torque(drive: DriveTorque, ax: Axes) -> Axes:
 
 
 def stress_against_strength(assessment: Assessment, ax: Axes) -> Axes:
-    """Contact stress [GPa] of the nominal machine and of those in tolerance, beside the strength."""
+    """Contact stress [GPa] of the nominal machine and of those in tolerance, beside the strength that is stated."""
     criteria = assessment.criteria
-    grid = np.linspace(-4.0, 4.0, 161) * criteria.strength_deviation + criteria.strength
+    strength, deviation, radius, modulus = (float(getattr(criteria, name)) for name in STRENGTH)
+    grid = np.linspace(-4.0, 4.0, 161) * deviation + strength
 
     def stress(peaks: Array) -> Array:
-        pressure = hertz_pressure(peaks, criteria.contact_radius, criteria.contact_modulus)
+        pressure = hertz_pressure(peaks, radius, modulus)
         return np.asarray(1e-9 * criteria.fatigue_factor * pressure)
 
     nominal = stress(assessment.nominal.worse_side(criteria.life_exponent))
@@ -176,11 +178,11 @@ def stress_against_strength(assessment: Assessment, ax: Axes) -> Axes:
     else:
         for k, value in enumerate(np.unique(nominal)):
             ax.axvline(value, color=INK, lw=1.1, label=None if k else "stress, nominal machine")
-    if criteria.strength_deviation > 0.0:
-        density = 1e9 * stats.norm.pdf(grid, criteria.strength, criteria.strength_deviation)
+    if deviation > 0.0:
+        density = 1e9 * stats.norm.pdf(grid, strength, deviation)
         ax.fill_between(1e-9 * grid, density, color=BAD, alpha=0.35, lw=0, label="strength")
     else:
-        ax.axvline(1e-9 * criteria.strength, color=BAD, lw=1.6, label="strength")
+        ax.axvline(1e-9 * strength, color=BAD, lw=1.6, label="strength")
     ax.set(xlabel="contact stress [GPa]", ylabel="density [1/GPa]", title="Stress against strength")
     ax.set_ylim(0.0, 1.3 * ax.get_ylim()[1])
     ax.legend(loc="upper left")
@@ -237,8 +239,12 @@ def scatter_of_series(assessment: Assessment, found: Combination, ax: Axes) -> A
 
 
 def cost_against_life(found: Improvement, ax: Axes) -> Axes:
-    """Life of each change that was assessed, in required lives, over its cost; a line joins the front of both."""
+    """Life of each change that was assessed over its cost; a line joins the front of both.
+
+    Lives are required ones, or those of the machine as it is where none is required.
+    """
     trials = found.suggestions
+    unit = "required" if all(one.judges_life for one in trials) else "present"
     finite = [trial.life for trial in trials if np.isfinite(trial.life)]
     top = 3.0 * max([1.0, *finite])
     for kind, colour in TYPE_COLOURS.items():
@@ -248,32 +254,39 @@ def cost_against_life(found: Improvement, ax: Axes) -> Axes:
                 label = f"Type {kind}" if kind != "undetermined" else kind
                 at = [(one.cost, min(one.life, top)) for one in rows]
                 face = colour if filled else "white"
-                name = label + ("" if filled else ", misses a criterion")
+                misses = not filled and any(one.assessment.checks for one in rows)
+                name = label + (", misses a criterion" if misses else "")
                 ax.plot(*np.transpose(at), "o", ms=6, mfc=face, mec=colour, label=name)
     front = found.front
     ax.plot([one.cost for one in front], [min(one.life, top) for one in front], color=INK, lw=1.0, label="front")
     ax.axhline(1.0, color=BAD, lw=1.2, ls="--")
     if any(not np.isfinite(one.life) for one in trials):
         ax.annotate("no contact", (0.0, top), fontsize="small", va="bottom")
-    ax.set(yscale="log", xlabel="relative cost", ylabel="life [required lives]", title="What a longer life costs")
+    ax.set(yscale="log", xlabel="relative cost", ylabel=f"life [{unit} lives]", title="What a longer life costs")
     ax.legend(loc="upper left", bbox_to_anchor=(0.0, -0.16), ncols=2)
     return ax
 
 
 def series_life(assessment: Assessment, ax: Axes) -> Axes:
-    """Life of every machine in tolerance by its own statistics [10^6 cycles], ascending, with the requirement."""
+    """Life of every machine in tolerance by its own statistics [10^6 cycles], ascending, with what is required.
+
+    Where no load rating is stated: its equivalent force [N].
+    """
     criteria = assessment.criteria
-    exponent = criteria.life_exponent
+    exponent, rating, required = criteria.life_exponent, criteria.load_rating, criteria.life
     runs = assessment.series.runs or (assessment.nominal,)
-    lives = np.array([statistical_life(run.worse_side(exponent), criteria.load_rating, exponent) for run in runs])
+    forces = [equivalent_force(run.worse_side(exponent), exponent) for run in runs]
+    lives = np.array(forces if rating is None else [rating_life(force, rating, exponent) for force in forces])
     order = np.argsort(lives)
     colours = [NATURE_COLOURS[runs[k].nature] for k in order]
     ax.scatter(np.arange(1, len(runs) + 1), lives[order], c=colours, s=22, lw=0)
-    ax.axhline(criteria.life, color=BAD, lw=1.3, ls="--")
-    own = assessment.nominal_evaluation.life
-    ax.axhline(own, color=MUTED, lw=1.0, ls=":")
-    handles = [
-        Line2D([], [], color=BAD, lw=1.3, ls="--", label=f"required {criteria.life:,.0f}"),
+    own = assessment.nominal_evaluation
+    ax.axhline(own.force if rating is None else own.life, color=MUTED, lw=1.0, ls=":")
+    handles = []
+    if rating is not None and required is not None:
+        ax.axhline(required, color=BAD, lw=1.3, ls="--")
+        handles.append(Line2D([], [], color=BAD, lw=1.3, ls="--", label=f"required {required:,.0f}"))
+    handles += [
         Line2D([], [], color=MUTED, lw=1.0, ls=":", label="nominal machine"),
         *(
             Line2D([], [], ls="", marker="o", ms=5, color=NATURE_COLOURS[kind], label=kind)
@@ -282,9 +295,14 @@ def series_life(assessment: Assessment, ax: Axes) -> Axes:
         ),
     ]
     ax.legend(handles=handles, loc="upper left", bbox_to_anchor=(0.0, -0.16), ncols=3)
+    if rating is None:
+        ax.set(xlabel="machine, by force", ylabel="equivalent force [N]", title="Force of each machine built")
+        ax.set_ylim(0.0, 1.15 * max(*forces, own.force) or 1.0)
+        return ax
     finite = lives[np.isfinite(lives)]
     if len(finite):
-        ax.set_ylim(0.6 * min(finite.min(), criteria.life), 2.5 * max(finite.max(), criteria.life))
+        shown = [*finite, *([required] if required is not None else [])]
+        ax.set_ylim(0.6 * min(shown), 2.5 * max(shown))
     ax.set(yscale="log", xlabel="machine, by life", ylabel="life [10$^6$ cycles]", title="Life of each machine built")
     return ax
 

@@ -18,10 +18,10 @@ from matplotlib.figure import Figure
 
 from chaosgym.arrays import Array
 from chaosgym.design.bearing import hours_of
+from chaosgym.design.design_study import DesignStudy
 from chaosgym.design.fatigue import rating_life
 from chaosgym.design.measured import MeasuredPeaks
 from chaosgym.design.methodology import Assessment
-from chaosgym.design.study import DesignStudy
 from chaosgym.design.told import CRITERIA, hours_told, life_told, listed, number_told, percent_told, share_told
 from chaosgym.errors import DesignError
 from chaosgym.files import write_atomically
@@ -39,6 +39,7 @@ HEADLINES = {
     "meets": ("good", "Meets its criteria"),
     "fails": ("bad", "Does not meet its criteria"),
     "undetermined": ("open", "Not decided"),
+    "not judged": ("open", "Not judged"),
 }
 
 WHAT_TYPES_MEAN = {
@@ -102,8 +103,10 @@ def design_report(study: DesignStudy, command: str = "", *, date: str = "", brie
         brief=brief,
         trials=tried if best is None else [best, *(trial for trial in tried if trial is not best)],
         service_hours=hours_of(found.evaluation.life_interval.low, found.cycle_period),
-        required_hours=hours_of(criteria.life, found.cycle_period),
-        rainflow_life=rating_life(study.force_of_every_impact, criteria.load_rating, criteria.life_exponent),
+        required_hours=None if criteria.life is None else hours_of(criteria.life, found.cycle_period),
+        rainflow_life=None
+        if criteria.load_rating is None
+        else rating_life(study.force_of_every_impact, criteria.load_rating, criteria.life_exponent),
         described=parameters_of(found.machine),
         reference=type(found.machine)(),
         asked=parameters_of(criteria),
@@ -129,9 +132,7 @@ def measured_report(measured: MeasuredPeaks, command: str = "") -> str:
         picture_of(record, "Peak force of every cycle, and how often each force occurs.", wide=True),
         picture_of(_figure_of_convergence(measured.peaks, measured.convergence.cycles), CONVERGENCE),
     ]
-    return rendered(
-        "measured.html", command, measured=measured, asked=parameters_of(measured.criteria), pictures=pictures
-    )
+    return rendered("measured.html", command, measured=measured, pictures=pictures)
 
 
 def rendered(template: str, command: str, **names: object) -> str:
@@ -216,9 +217,11 @@ def _pictures(study: DesignStudy) -> list[Picture]:
     ]
     if study.improvement is not None and study.improvement.suggestions:
         improvement = study.improvement
+        solid = "Filled: meets all criteria. " if found.checks else ""
+        what = "that meet" if found.criteria.judges_machines else "that are periodic"
         caption = (
-            "Every change that was assessed over the tolerances. Filled: meets all criteria. No change off the line is "
-            "better than one on it in cost, life and share of machines that meet."
+            f"Every change that was assessed over the tolerances. {solid}No change off the line is better than one "
+            f"on it in cost, life and share of machines {what}."
         )
         pictures.append(picture_of(drawn_by(lambda ax: figures.cost_against_life(improvement, ax)), caption))
     if study.map is not None:
@@ -234,8 +237,9 @@ def _pictures(study: DesignStudy) -> list[Picture]:
         pictures.append(picture_of(drawn_by(lambda ax: figures.life_over_speed(trend, machine, ax)), caption))
     caption = "Machines with deviations spread over all tolerances at once, each from rest, by its own statistics."
     pictures.append(picture_of(drawn_by(lambda ax: figures.series_life(found, ax)), caption))
-    caption = "Contact stress at the peak of every cycle, beside the scatter of the strength."
-    pictures.append(picture_of(drawn_by(lambda ax: figures.stress_against_strength(found, ax)), caption))
+    if found.criteria.tells_reliability:
+        caption = "Contact stress at the peak of every cycle, beside the scatter of the strength."
+        pictures.append(picture_of(drawn_by(lambda ax: figures.stress_against_strength(found, ax)), caption))
     if found.trend.parameters:
         caption = (
             f"Least squares over the machines in tolerance; the trend leaves {100 * found.trend.unexplained:.1f} % "

@@ -1,7 +1,4 @@
-"""The force and the time among the columns of a recording, never a counter by mistake.
-
-Instants follow from a rate, or from time stamps whose rounding is forgiven and whose gaps are told.
-"""
+"""The force and the speed among the columns of a recording, never a counter or a clock by mistake."""
 
 import math
 import re
@@ -12,11 +9,11 @@ import numpy as np
 
 from chaosgym.arrays import Array
 from chaosgym.errors import DiagnosisError
+from chaosgym.recordings.quantities import CLOCK, FORCES, OTHERS, SPEEDS, VOLTS, as_unit, split_unit
 from chaosgym.recordings.read import Recording
-from chaosgym.units import ALTERNATIVES
 
 OTHER = re.compile(
-    r"(time|zeit|temps|stamp|date|datum|clock|cycle|zyklus|takt|index|nr|no|count(er)?|rpm|speed|drehzahl|hz|freq\w*|"
+    r"(cycle|zyklus|takt|index|nr|no|count(er)?|rpm|speed|drehzahl|hz|freq\w*|"
     r"phase|angle|winkel|trigger|tacho\w*|temp\w*|displacement|velocity|position|weg)",
     re.IGNORECASE,
 )
@@ -25,19 +22,11 @@ OTHER = re.compile(
 SPEED = re.compile(r"hz|freq\w*|frequenz|rpm|speed|drehzahl", re.IGNORECASE)
 """Words in the name of a column that holds the speed of each reading."""
 
-SPEEDS = ("Hz", "rpm", "1/min", "min-1", "rad/s")
-
-TIMES = {"s": 1.0, "ms": 1e-3, "us": 1e-6, "µs": 1e-6, "μs": 1e-6, "min": 60.0, "h": 3600.0}
-FORCES = {**ALTERNATIVES["N"], "daN": 10.0, "MN": 1e6, "kgf": 9.80665}
-_OTHERS = "g m/s² m/s2 m/s^2 m/s mm/s in/s m mm um µm μm in mil Pa kPa MPa bar psi V mV µV uV A mA Nm N·m FS"
-OTHERS = frozenset(_OTHERS.split())
-"""Units of force, and those of quantities that are judged in their own unit."""
+FIRST = 1000
+"""Readings that tell of most columns that they are no clock."""
 
 MOST_SHOWN = 12
 """Columns that a message names."""
-
-VOLTS = {"V": 1.0, "mV": 1e-3, "µV": 1e-6, "uV": 1e-6}
-
 
 CALIBRATION = re.compile(r"\s*([\d.,]+(?:e[+-]?\d+)?)\s*([^\s/]+(?:/s(?:²|2|\^2))?)\s*(?:/\s*(\S+))?\s*", re.IGNORECASE)
 """A number, a unit and the unit that it is divided by."""
@@ -57,20 +46,24 @@ class Signal(NamedTuple):
 
 def is_counter(values: Array) -> bool:
     """Whether values rise in equal steps, as a counter or an even time stamp does."""
-    steps = np.diff(values)
-    return len(values) > 4 and bool(steps[0] > 0.0 and np.allclose(steps, steps[0], rtol=1e-6, atol=0.0))
+    steps = np.diff(values[:FIRST])
+    even = len(values) > 4 and bool(steps[0] > 0.0 and np.allclose(steps, steps[0], rtol=1e-6, atol=0.0))
+    return even and (len(values) <= FIRST or bool(np.allclose(np.diff(values), steps[0], rtol=1e-6, atol=0.0)))
 
 
 def is_clock(values: Array) -> bool:
     """Whether values never fall and rise on and on, as rounded time stamps do."""
+    if np.any(np.diff(values[:FIRST]) < 0.0):
+        return False
     steps = np.diff(values)
     steady = len(values) > 7 and bool(np.all(steps >= 0.0) and steps.mean() > 0.0)
     return is_counter(values) or (steady and float(np.max(steps)) < 20.0 * float(steps.mean()))
 
 
-def _counts(values: Array) -> bool:
-    """Whether values are whole numbers in steps of one."""
-    return is_counter(values) and bool(values[1] - values[0] == 1.0 and values[0] == round(float(values[0])))
+def rises(values: Array) -> bool:
+    """Whether values seldom fall, as instants do of which some are wrong."""
+    steps = np.diff(values)
+    return bool(np.count_nonzero(steps >= 0.0) >= 0.9 * len(steps))
 
 
 def force_names(recording: Recording) -> list[str]:
@@ -85,10 +78,11 @@ def force_names(recording: Recording) -> list[str]:
 def _speaks_against(recording: Recording, name: str) -> str:
     """Why a column is no force; empty if it may be one."""
     values, unit = recording.columns[name], recording.units.get(name, "")
-    finite = values[np.isfinite(values)]
+    finite = _finite(values)
     if unit and unit not in FORCES:
         return f"is in {unit}"
-    if recording.named and any(OTHER.fullmatch(word) for word in re.split(r"[\W_\d]+", name) if word):
+    words = [word for word in re.split(r"[\W_\d]+", name) if word] if recording.named else []
+    if any(OTHER.fullmatch(word) or (CLOCK.fullmatch(word) and rises(finite)) for word in words):
         return "is no force by its name"
     return (
         "rises like a counter or a clock"
@@ -133,7 +127,8 @@ def choose_force(
                 "use --column NAME"
             )
         if not names:
-            why = _first([f"{name!r} {_speaks_against(recording, name)}" for name in recording.columns], "; ")
+            told = {name: _speaks_against(recording, name) for name in recording.columns} | dict(recording.texts)
+            why = _first([f"{name!r} {reason}" for name, reason in told.items()], "; ")
             raise DiagnosisError(f"{recording.source} has no column that could be a force ({why}); use --column NAME")
         name = names[0]
     else:
@@ -142,18 +137,25 @@ def choose_force(
 
 
 def named_column(recording: Recording, column: str) -> str:
-    """Name of the column that is meant by a name or a number.
+    """Name of the column that is meant by a name, with or without its unit and its group, or by a number.
 
     Raises
     ------
     DiagnosisError
         If there is none.
     """
-    matching = [name for name in recording.columns if name.casefold() == column.strip().casefold()]
+    asked = {column.strip().casefold(), split_unit(column)[0].casefold()}
+    matching = [name for name in recording.columns if name.casefold() in asked]
     place = re.fullmatch(r"\d{1,9}", column.strip(), re.ASCII)
     if not matching and place and 1 <= int(column) <= len(recording.columns):
         matching = [list(recording.columns)[int(column) - 1]]
     if not matching:
+        within = [name for name in recording.columns if re.split(r"[/.]", name.casefold())[-1] in asked]
+        matching = within if len(within) == 1 else []
+    if not matching:
+        text = next((name for name in recording.texts if name.casefold() in asked), None)
+        if text is not None:
+            raise DiagnosisError(f"{recording.source}: column {text!r} {recording.texts[text]}")
         listed = _first(list(map(repr, dict.fromkeys([*recording.columns, *recording.problems]))), ", ")
         raise DiagnosisError(f"{recording.source} has no column {column!r}; its columns of numbers: {listed}")
     return matching[0]
@@ -183,7 +185,8 @@ def choose_speed(recording: Recording, column: str | None = None) -> Signal:
     if name in recording.problems:
         raise DiagnosisError(f"{recording.source}, {recording.problems[name]}")
     unit = recording.units.get(name, "")
-    return Signal(recording.columns[name], name, f"column {name!r}{f' ({unit})' if unit else ''} is the speed", unit)
+    described = f"column {name!r}{f' ({unit})' if unit else ''} is the speed"
+    return Signal(recording.columns[name].astype(float), name, described, unit)
 
 
 def forces(
@@ -218,14 +221,16 @@ def named_columns(recording: Recording, column: str) -> list[str]:
 def _force(recording: Recording, name: str, unit: str | None, scale: str | None) -> Signal:
     if name in recording.problems:
         raise DiagnosisError(f"{recording.source}, {recording.problems[name]}")
-    values, written = recording.columns[name], unit or recording.units.get(name, "")
+    if name in recording.doubts and not unit:
+        raise DiagnosisError(f"{recording.source}: column {name!r} {recording.doubts[name]}; state it with --unit")
+    values, written = recording.columns[name], as_unit(unit or "") or unit or recording.units.get(name, "")
     if written and written not in FORCES and written not in OTHERS and not scale:
         told = "allowed" if unit else "give its unit with --unit"
         listed = ", ".join([*FORCES, *sorted(OTHERS)])
         raise DiagnosisError(
             f"{recording.source}: column {name!r} is in {written}, no unit that is known; {told}: {listed}"
         )
-    if is_counter(values[np.isfinite(values)]):
+    if is_counter(_finite(values)):
         raise DiagnosisError(f"{recording.source}: column {name!r} rises in equal steps and can't be a force")
     factor, target = FORCES.get(written or "N", 1.0), "N" if (written or "N") in FORCES else written
     shown = f"{written}" if written else "taken as N"
@@ -235,7 +240,13 @@ def _force(recording: Recording, name: str, unit: str | None, scale: str | None)
     described = f"{recording.source}: {recording.form}, column {name!r} ({shown}), {len(values)} readings"
     if missing := int(np.count_nonzero(~np.isfinite(values))):
         described += f", {missing} of them missing, the first in {recording.where(int(np.argmin(np.isfinite(values))))}"
-    return Signal(values * factor, name, described, target)
+    return Signal(values if factor == 1.0 else np.multiply(values, factor, dtype=float), name, described, target)
+
+
+def _finite(values: Array) -> Array:
+    """Readings without those that are missing."""
+    there = np.isfinite(values)
+    return values if there.all() else values[there]
 
 
 def calibration(scale: str, written: str) -> tuple[float, str]:
@@ -285,29 +296,7 @@ def check_peaks(signal: Signal, recording: Recording) -> Array:
             f"{recording.source}, {recording.where(int(low[0]))}: {signal.values[low[0]]:g} N is a negative force; "
             "allowed: 0 N and more, one peak a cycle"
         )
-    return signal.values[np.isfinite(signal.values)]
-
-
-def choose_time(recording: Recording, *, told: bool = False) -> Signal | None:
-    """Time stamps [s], if a column holds them: by its unit, its name, or as the one that rises like a clock.
-
-    With ``told`` only those that unit or name tell. A column that counts one by one is no clock.
-    """
-    fits = [name for name in recording.columns if recording.units.get(name, "") in TIMES]
-    fits += [name for name in recording.columns if re.search(r"time|zeit|temps|stamp", name, re.IGNORECASE)]
-    if len(recording.columns) > 1 and not told:
-        fits += [
-            name
-            for name, values in recording.columns.items()
-            if is_clock(values) and not recording.units.get(name) and not _counts(values)
-        ]
-    if not fits:
-        return None
-    name = fits[0]
-    if name in recording.problems:
-        raise DiagnosisError(f"{recording.source}, {recording.problems[name]}")
-    unit = recording.units.get(name, "s")
-    return Signal(recording.columns[name] * TIMES.get(unit, 1.0), name, f"time from column {name!r} [{unit}]", "s")
+    return _finite(signal.values).astype(float)
 
 
 def _first(texts: list[str], between: str) -> str:

@@ -15,9 +15,13 @@ from chaosgym.recordings.columns import Signal, choose_force, named_column
 from chaosgym.recordings.read import Recording
 from chaosgym.recordings.sampling import Sampling, sampling
 from chaosgym.recordings.tachometer import Turns, turns_of
+from chaosgym.units import duration
 
 FEWEST_SAMPLES = 8
 """Samples that a cycle must have."""
+
+LONG, PER_CYCLE, BLOCK = 2**20, 16, 2**18
+"""Samples from which a spectrum is that of means, as many of them a cycle, and samples that are looked at in turn."""
 
 PHASES = 64
 """Phases at which the quietest one is looked for."""
@@ -81,9 +85,14 @@ def estimated_period(value: Array, step: float) -> float:
     DiagnosisError
         If no line stands out.
     """
+    if len(value) > LONG:
+        coarse = estimated_period(value[:LONG], step)
+        if coarse < FEWEST_SAMPLES * step:
+            return coarse
+        several = max(1, int(coarse / step / PER_CYCLE))
+        return strongest_line(_averaged(value, several), several * step, coarse, 4.0 * coarse / (LONG * step))
     size = len(value)
-    window = np.hanning(size)
-    power = np.abs(np.fft.rfft((value - value.mean()) * window, 4 * size)) ** 2
+    power = _power(value, 4 * size)
     power[: 4 * 3] = 0.0
     peak = int(np.argmax(power))
     if power[peak] < 30.0 * float(np.mean(power)):
@@ -94,16 +103,45 @@ def estimated_period(value: Array, step: float) -> float:
         near = slice(max(12, place - 4), place + 5)
         if place > 16 and power[near].max() > 0.05 * power[peak]:
             best = near.start + int(np.argmax(power[near]))
+    if best == len(power) - 1:  # the reading alternates with every sample
+        return 2.0 * step
+    return 4 * size * step / (best + _between(power, best))
+
+
+def strongest_line(value: Array, step: float, period: float, width: float) -> float:
+    """Cycle [s] of the largest line of the spectrum, within a share of the frequency of a cycle."""
+    padded = 4 * len(value)
+    power = _power(value, padded)
+    place = padded * step / period
+    low = max(1, int((1.0 - width) * place))
+    best = low + int(np.argmax(power[low : int((1.0 + width) * place) + 2]))
+    return padded * step / (best + _between(power, best))
+
+
+def _between(power: Array, best: int) -> float:
+    """Where a line lies between its place and the next one, by a parabola through the logarithms."""
     left, middle, right = (math.log(max(float(power[best + k]), 1e-300)) for k in (-1, 0, 1))
-    shift = 0.5 * (left - right) / (left - 2.0 * middle + right) if left - 2.0 * middle + right else 0.0
-    return 4 * size * step / (best + shift)
+    return 0.5 * (left - right) / (left - 2.0 * middle + right) if left - 2.0 * middle + right else 0.0
+
+
+def _power(value: Array, padded: int) -> Array:
+    """Power of the spectrum of a signal without its mean, under a Hann window."""
+    signal = np.asarray(value, dtype=float)
+    return np.asarray(np.abs(np.fft.rfft((signal - signal.mean()) * np.hanning(len(signal)), padded)) ** 2)
+
+
+def _averaged(value: Array, several: int) -> Array:
+    """Means of several samples in turn."""
+    whole = len(value) // several * several
+    return np.asarray(value[:whole].reshape(-1, several).mean(axis=1, dtype=float))
 
 
 def strongest_line_nearby(value: Array, step: float, period: float) -> float | None:
     """Cycle [s] of a line of the spectrum that lies beside the stated cycle, within 5 %; None if the statement fits."""
-    size = len(value)
-    padded = 8 * size
-    power = np.abs(np.fft.rfft((value - value.mean()) * np.hanning(size), padded)) ** 2
+    if len(value) > LONG and (several := int(period / step / PER_CYCLE)) > 1:
+        value, step = _averaged(value, several), several * step
+    padded = 8 * len(value)
+    power = _power(value, padded)
     place = padded * step / period
     low, high = int(0.95 * place), int(1.05 * place) + 2
     if low < 16 or high >= len(power):
@@ -139,14 +177,14 @@ def cycle_peaks(
     if turns is not None:
         starts = turns.starts
         cycle = float(np.mean(np.diff(starts)))
-        notes.append(f"cycle from the tachometer: {cycle:.6g} s on average, {len(starts) - 1} cycles")
+        notes.append(f"cycle from the tachometer: {duration(cycle, 6)} on average, {len(starts) - 1} cycles")
         notes += filter(None, [turns.told])
     elif period is None:
         cycle = estimated_period(value, instants.step)
-        condition = f"if the cycle is {1e3 * cycle:.4g} ms"
+        condition = f"if the cycle is {duration(cycle)}"
         notes.append(
-            f"cycle estimated from the spectrum: {cycle:.6g} s ({1.0 / cycle:.5g} Hz); state it (--hz, --rpm) if that "
-            "is not the speed"
+            f"cycle estimated from the spectrum: {duration(cycle, 6)} ({1.0 / cycle:.5g} Hz); state it (--hz, --rpm) "
+            "if that is not the speed"
         )
     else:
         cycle = period
@@ -158,65 +196,74 @@ def cycle_peaks(
                 notes.append(
                     f"the spectrum has its line at {1.0 / other:.6g} Hz, beside the stated {1.0 / period:.6g} Hz"
                 )
-        first = instants.time[0]
-        starts = first + cycle * np.arange(int((instants.time[-1] + instants.step - first) / cycle * (1.0 + 1e-12)) + 1)
-    starts = _shifted_to_quiet(value, instants.time, starts)
-    peaks, kept, spread = _largest(np.where(missing, np.nan, value), instants, starts)
+        first = instants.at(0)
+        whole = int((instants.at(-1) + instants.step - first) / cycle * (1.0 + 1e-12))
+        starts = np.asarray(first + cycle * np.arange(whole + 1))
+    starts = _shifted_to_quiet(value, instants, starts)
+    peaks, kept, spread = _largest(np.where(missing, np.nan, value) if missing.any() else value, instants, starts)
     dropped = len(starts) - 1 - len(peaks)
     if dropped:
         notes.append(f"{dropped} cycles left out: samples are missing")
     if len(peaks) == 0:
-        raise DiagnosisError(f"the series holds no whole cycle of {cycle:g} s")
+        raise DiagnosisError(f"the series holds no whole cycle of {duration(cycle)}")
     return CyclePeaks(peaks, kept, spread, cycle, tuple(notes), condition)
 
 
 def _filled(value: Array) -> Array:
     """The signal with straight lines over what is missing."""
     there = np.isfinite(value)
+    if there.all():
+        return value
     places = np.arange(len(value))
-    return value if there.all() else np.interp(places, places[there], value[there])
+    return np.asarray(np.interp(places, places[there], value[there]), dtype=float)
 
 
 def _check_cycle(cycle: float, instants: Sampling) -> None:
-    lasts = float(instants.time[-1] - instants.time[0]) + instants.step
+    lasts = instants.at(-1) - instants.at(0) + instants.step
     if cycle < FEWEST_SAMPLES * instants.step:
         held = cycle / instants.step
-        raise DiagnosisError(f"a cycle of {cycle:g} s holds {held:.1f} samples; allowed: at least {FEWEST_SAMPLES}")
+        raise DiagnosisError(
+            f"a cycle of {duration(cycle)} holds {held:.1f} samples; allowed: at least {FEWEST_SAMPLES}"
+        )
     if cycle > lasts * (1.0 + 1e-9):
-        raise DiagnosisError(f"the series lasts {lasts:g} s, less than one cycle of {cycle:g} s")
+        raise DiagnosisError(f"the series lasts {duration(lasts)}, less than one cycle of {duration(cycle)}")
 
 
-def _shifted_to_quiet(value: Array, time: Array, starts: Array) -> Array:
+def _shifted_to_quiet(value: Array, instants: Sampling, starts: Array) -> Array:
     """Starts at the phase at which the signal is smallest, so that no peak is cut in two."""
     lengths = np.diff(starts)
-    which = np.clip(np.searchsorted(starts, time, side="right") - 1, 0, len(starts) - 2) if len(lengths) else None
-    if which is None:
+    if not len(lengths):
         return starts
-    phase = np.floor(PHASES * (time - starts[which]) / lengths[which]).astype(int) % PHASES
     loud = np.zeros(PHASES)
-    np.maximum.at(loud, phase, np.abs(value))
+    for first in range(0, len(value), BLOCK):
+        time = instants.part(first, first + BLOCK)
+        which = np.clip(np.searchsorted(starts, time, side="right") - 1, 0, len(starts) - 2)
+        phase = np.floor(PHASES * (time - starts[which]) / lengths[which]).astype(int) % PHASES
+        np.maximum.at(loud, phase, np.abs(value[first : first + BLOCK]))
+    begin, end = instants.at(0), instants.at(-1)
     loud = np.maximum(loud, np.maximum(np.roll(loud, 1), np.roll(loud, -1)))
     quiet = np.flatnonzero(loud <= loud.min() * (1.0 + 1e-9) + 1e-300)
     share = (quiet[len(quiet) // 2] + 0.5) / PHASES
     shifted = starts[:-1] + share * lengths
-    if starts[-1] + share * lengths[-1] <= time[-1] + 0.5 * (time[-1] - time[-2]):
+    if starts[-1] + share * lengths[-1] <= end + 0.5 * (end - instants.at(-2)):
         shifted = np.append(shifted, starts[-1] + share * lengths[-1])
-    if shifted[0] - (shifted[1] - shifted[0] if len(shifted) > 1 else lengths[0]) >= time[0] - 1e-12:
+    if shifted[0] - (shifted[1] - shifted[0] if len(shifted) > 1 else lengths[0]) >= begin - 1e-12:
         shifted = np.insert(shifted, 0, 2.0 * shifted[0] - shifted[1] if len(shifted) > 1 else shifted[0] - lengths[0])
     return shifted if len(shifted) > 1 else starts
 
 
 def _largest(value: Array, instants: Sampling, starts: Array) -> tuple[Array, Array, float]:
     """(largest modulus of each whole cycle, where these begin, half width that sampling leaves open)."""
-    size = np.abs(value)
-    edges = np.searchsorted(instants.time, starts - 1e-9 * instants.step)
+    edges = instants.places(starts - 1e-9 * instants.step)
     peaks, kept, opens = [], [], []
     for first, last, begin, end in zip(edges[:-1], edges[1:], starts[:-1], starts[1:], strict=True):
         whole = last - first >= max(1.0, FULL * (end - begin) / instants.step - 1.0)
-        if not whole or np.isnan(size[first:last]).any():
+        size = np.abs(value[max(0, first - 1) : last + 1].astype(float))
+        inside = size[first - max(0, first - 1) :][: last - first]
+        if not whole or np.isnan(inside).any():
             continue
         kept.append(begin)
-        top = int(first + np.argmax(size[first:last]))
+        top = first - max(0, first - 1) + int(np.argmax(inside))
         if 0 < top < len(size) - 1 and size[top] >= max(size[top - 1], size[top + 1]):
             curve = size[top - 1] - 2.0 * size[top] + size[top + 1]
             slope = size[top + 1] - size[top - 1]
@@ -276,10 +323,10 @@ def series_of(
         signal = choose_force(replace(recording, columns=rest), None, unit, scale)
     else:
         signal = choose_force(recording, column, unit, scale)
-    instants = sampling(recording, len(signal.values), rate_hz)
-    size = min(len(signal.values), len(instants.time))
-    instants = instants._replace(time=instants.time[:size])
-    signal = signal._replace(values=signal.values[:size])
+    instants = sampling(recording, len(signal.values), rate_hz, signal.name)
+    size = min(len(signal.values), instants.size)
+    instants = instants.shortened(size)
+    signal = signal._replace(values=signal.values[:size], described=f"{signal.described}; {instants}")
     if tachometer is None:
         return signal, instants, None
     if tachometer == signal.name:
@@ -335,4 +382,8 @@ def peaks_of_series(
         pulses_per_revolution=pulses_per_revolution,
         scale=scale,
     )
-    return signal, cycle_peaks(signal.values, instants, period, turns)
+    cut = cycle_peaks(signal.values, instants, period, turns)
+    if cut.condition and recording.speeds:
+        listed = ", ".join(f"{key} = {speed:g}" for key, speed in recording.speeds.items())
+        cut = replace(cut, notes=(*cut.notes, f"the file states {listed}; if that is the speed, state it"))
+    return signal, cut

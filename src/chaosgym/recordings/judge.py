@@ -26,6 +26,9 @@ from chaosgym.series.verdict import Diagnosis, undetermined
 FEWEST_CYCLES, SHORT_RECORD = 8, 16
 """Cycles below which a record is refused, and below which nothing is told of it."""
 
+MORE = ("more cycles",)
+"""What tells more of a record that is too short."""
+
 LARGEST_FORCE, SMALLEST_FORCE = 1e9, 1e-100
 """Force [N] beyond which a unit must be wrong, and below which its square is no number."""
 
@@ -86,7 +89,7 @@ def judge_peaks(
         return MeasuredVerdict(undetermined("all peaks are zero: there is no contact to judge", readings), told)
     if len(readings) < SHORT_RECORD:
         few = f"{len(readings)} cycles are too few to judge; needed: {SHORT_RECORD} or more"
-        return MeasuredVerdict(undetermined(few, readings), told)
+        return MeasuredVerdict(undetermined(few, readings, MORE), told)
     whole, outliers, gaps = repair(readings)
     why = unsteady(whole)
     if why:
@@ -178,7 +181,7 @@ def _judge_part(readings: Array, told: SensorError | None, resolved: float) -> M
     """Verdict on a stretch of one regime."""
     size = len(readings)
     if size < SHORT_RECORD:
-        return MeasuredVerdict(undetermined(f"{size} cycles are too few to judge", readings), told)
+        return MeasuredVerdict(undetermined(f"{size} cycles are too few to judge", readings, MORE), told)
     found, exact = None, two_step_test(readings)
     if exact.nature in ("chaotic", "undetermined"):
         found = scatter_of(readings, resolved / math.sqrt(3.0))

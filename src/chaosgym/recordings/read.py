@@ -6,7 +6,7 @@ CSV with any common delimiter, decimal comma, UTF-8 or UTF-16, comments and a he
 """
 
 import hashlib
-import io
+import mmap
 import os
 import select
 import stat
@@ -14,17 +14,15 @@ import sys
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Any
 
 import numpy as np
-import pyarrow as pa
-import pyarrow.csv
 
 from chaosgym.arrays import Array
 from chaosgym.errors import DiagnosisError
-from chaosgym.recordings import recorders
-from chaosgym.recordings.heading import split_unit
-from chaosgym.recordings.text import MOST_MISSING, read_text
+from chaosgym.recordings.formats import format_of
+from chaosgym.recordings.naming import Named, named
+from chaosgym.recordings.quantities import split_unit
+from chaosgym.recordings.raw import Data, Parts, Raw
 
 
 @dataclass(frozen=True)
@@ -43,8 +41,14 @@ class Recording:
         Why a column can't be used: its first entry that is no finite number, with its line.
     lines
         Line of each reading; empty for binary files.
-    rate_hz
-        Sampling rate, where the file holds it.
+    rates
+        Sampling rates [Hz] that the file states, by the name of the number, or of the column that they belong to.
+    speeds
+        Speeds [rpm] that the file states, by the name of the number.
+    texts
+        Columns of text: the first of them, with its line.
+    doubts
+        Why the unit of a column is in doubt.
     sha256
         Of the bytes.
     form
@@ -60,8 +64,17 @@ class Recording:
     units: Mapping[str, str] = field(default_factory=dict)
     problems: Mapping[str, str] = field(default_factory=dict)
     lines: tuple[int, ...] = ()
-    rate_hz: float | None = None
+    rates: Mapping[str, float] = field(default_factory=dict)
+    speeds: Mapping[str, float] = field(default_factory=dict)
+    texts: Mapping[str, str] = field(default_factory=dict)
+    doubts: Mapping[str, str] = field(default_factory=dict)
     named: bool = True
+
+    @property
+    def rate_hz(self) -> float | None:
+        """Sampling rate [Hz], where the file states one, and no two that differ."""
+        rates = list(self.rates.values())
+        return rates[0] if rates and np.allclose(rates, rates[0], rtol=1e-6, atol=0.0) else None
 
     def __repr__(self) -> str:
         return f"<{self.source}: {self.form}; {', '.join(self.columns)}>"
@@ -71,8 +84,17 @@ class Recording:
         return f"line {self.lines[index]}" if index < len(self.lines) else f"reading {index + 1}"
 
 
-def read_recording(source: str | Path) -> Recording:
+def read_recording(source: str | Path, *, sheet: str | None = None, column: str | None = None) -> Recording:
     """Read a file; "-" is standard input.
+
+    Parameters
+    ----------
+    source
+        Name of the file.
+    sheet
+        Of a workbook, by name; without it the first one that has the column, or a table of numbers.
+    column
+        Name of the column that the workbook is searched for.
 
     Raises
     ------
@@ -89,27 +111,63 @@ def read_recording(source: str | Path) -> Recording:
         data = _standard_input() if str(source) == "-" else _bytes_of(Path(source))
     except OSError as error:
         raise DiagnosisError(f"{name} can't be read: {error.strerror}") from error
-    reader, form = _reader(data)
+    form = format_of(data)
     try:
-        found = reader(data)
+        raw = form.read(data)
+        if isinstance(raw, Raw) and sheet is not None:
+            raise DiagnosisError(f"is read as {form.name}, which has no sheets; got: sheet {sheet!r}")
+        raw, one = (raw, named(raw)) if isinstance(raw, Raw) else _part(raw, form.name, sheet, column)
     except DiagnosisError as error:
         raise DiagnosisError(f"{name} {error}") from error
-    except ImportError:
-        raise
     except Exception as error:  # whatever a library says of damaged bytes
-        raise DiagnosisError(f"{name} can't be read as {form}: {str(error).splitlines()[0][:120]}") from error
-    columns = {title: values for title, values in found.pop("columns").items() if len(values)}
-    problems = found.setdefault("problems", {})
-    if not columns and not problems:
+        raise DiagnosisError(
+            f"{name} can't be read as {form.name}: {(str(error).splitlines() or ['damaged'])[0][:120]}"
+        ) from error
+    if not one.columns and not one.problems:
         raise DiagnosisError(f"{name} holds no numbers")
-    for title, values in columns.items():
-        bad = np.flatnonzero(~np.isfinite(values))
-        if len(bad) > MOST_MISSING * len(values) and title not in problems:
-            lines = found.get("lines", ())
-            place = f"line {lines[bad[0]]}" if len(lines) else f"reading {bad[0] + 1}"
-            problems[title] = f"{place}: {str(values[bad[0]])!r} is not a finite number"
-    found["form"] = found.get("form", form)
-    return Recording(source=name, columns=columns, sha256=hashlib.sha256(data).hexdigest(), **found)
+    told = f", of another length and left out: {', '.join(one.left[:5])}" if one.left else ""
+    return Recording(
+        source=name,
+        form=raw.form + told,
+        sha256=hashlib.sha256(data).hexdigest(),
+        lines=raw.lines,
+        named=raw.named,
+        **{key: value for key, value in one._asdict().items() if key != "left"},
+    )
+
+
+FEWEST_ROWS = 8
+"""Readings of a column that make a sheet a table of numbers."""
+
+
+def _part(parts: Parts, form: str, sheet: str | None, column: str | None) -> tuple[Raw, Named]:
+    """The sheet that was asked for, or the first with the column, or with a table of numbers; else the longest.
+
+    Raises
+    ------
+    DiagnosisError
+        If there is no such sheet, or no sheet holds numbers.
+    """
+    if sheet is not None and sheet not in parts:
+        raise DiagnosisError(f"has no sheet {sheet!r}; its sheets: {', '.join(map(repr, parts))}")
+    tables: list[tuple[int, Raw, Named]] = []
+    for name in parts if sheet is None else [sheet]:
+        try:
+            raw = parts[name]()
+        except DiagnosisError:
+            if sheet is not None:
+                raise
+            continue
+        raw.form = f"{form}, sheet {name!r}" + (f" of {', '.join(map(repr, parts))}" if len(parts) > 1 else "")
+        one = named(raw)
+        rows = max(map(len, one.columns.values()), default=0)
+        wanted = split_unit(column or "")[0].casefold()
+        if wanted in map(str.casefold, one.columns) or (not wanted and rows >= FEWEST_ROWS):
+            return raw, one
+        tables.append((min(rows, FEWEST_ROWS), raw, one))
+    if not tables:
+        raise DiagnosisError("holds no numbers")
+    return max(tables, key=lambda table: table[0])[1:]
 
 
 LARGEST = 2**30
@@ -119,8 +177,8 @@ PATIENCE = 2.0
 """Time [s] in which a named pipe must have something to read."""
 
 
-def _bytes_of(path: Path) -> bytes:
-    """Bytes of a file or a named pipe.
+def _bytes_of(path: Path) -> Data:
+    """Bytes of a file, mapped into memory, or of a named pipe.
 
     Raises
     ------
@@ -137,7 +195,10 @@ def _bytes_of(path: Path) -> bytes:
             f"{path} holds {told.st_size / 2**30:.1f} GiB; allowed: up to 1 GiB; cut it, or one peak a cycle"
         )
     if not stat.S_ISFIFO(told.st_mode):
-        return path.read_bytes()
+        if not told.st_size:
+            return path.read_bytes()
+        with open(path, "rb") as file:
+            return mmap.mmap(file.fileno(), 0, access=mmap.ACCESS_READ)
     with open(os.open(path, os.O_RDONLY | os.O_NONBLOCK), "rb") as pipe:
         if not select.select([pipe], [], [], PATIENCE)[0]:
             raise DiagnosisError(f"{path} is a pipe into which nothing was written for {PATIENCE:g} s")
@@ -148,86 +209,3 @@ def _bytes_of(path: Path) -> bytes:
 def _standard_input() -> bytes:
     stream = getattr(sys.stdin, "buffer", None)
     return sys.stdin.read().encode() if stream is None else stream.read()
-
-
-def _reader(data: bytes) -> tuple[Any, str]:
-    """Function that reads the bytes, and the name of the format."""
-    if data[:6] == b"MATLAB":
-        return recorders.matlab, "MATLAB"
-    if data[:4] in (b"RIFF", b"RIFX"):
-        return recorders.wav, "WAV"
-    if data[:4] == b"PK\x03\x04":
-        return lambda workbook: read_text(recorders.excel(workbook)), "Excel"
-    if data[:80].split(b"\n")[0].strip() == b"-1":
-        return _universal, "UFF"
-    known = {b"PAR1": (_parquet, "Parquet"), b"\x93NUMPY": (_numpy, "NumPy"), **recorders.READERS}
-    return next((reader for first, reader in known.items() if data.startswith(first)), (read_text, "CSV"))
-
-
-def _parquet(data: bytes) -> dict[str, Any]:
-    import pyarrow.parquet as pq
-
-    table = pq.read_table(io.BytesIO(data))
-    columns, units = {}, {}
-    for column in table.schema:
-        if pa.types.is_timestamp(column.type):
-            stamps = table.column(column.name).to_numpy()
-            columns[column.name] = (stamps - stamps[0]) / np.timedelta64(1, "s")
-            units[column.name] = "s"
-            continue
-        if not (pa.types.is_floating(column.type) or pa.types.is_integer(column.type)):
-            continue
-        values = table.column(column.name).cast(pa.float64()).to_numpy(zero_copy_only=False)
-        name, unit = split_unit(column.name)
-        columns[name] = _without_end(np.asarray(values, dtype=float))
-        unit = (column.metadata or {}).get(b"unit", unit.encode()).decode()
-        if unit:
-            units[name] = unit
-    return {"columns": columns, "units": units}
-
-
-def _numbered(array: Array) -> dict[str, Array]:
-    """Columns of an array (n,) or (n, columns); the longer side are the readings."""
-    table = np.atleast_2d(np.asarray(array, dtype=float))
-    if table.ndim != 2:
-        raise DiagnosisError(f"holds an array of shape {np.shape(array)}; allowed: (n,) or (n, columns)")
-    table = table.T if table.shape[0] < table.shape[1] else table
-    return {f"column {place + 1}": _without_end(values) for place, values in enumerate(table.T)}
-
-
-def _numpy(data: bytes) -> dict[str, Any]:
-    array = np.load(io.BytesIO(data), allow_pickle=False)
-    if array.dtype.names:
-        return {"columns": {name: np.asarray(array[name], dtype=float) for name in array.dtype.names}}
-    return {"columns": _numbered(array), "named": False}
-
-
-def _universal(data: bytes) -> dict[str, Any]:
-    import tempfile
-
-    try:
-        import pyuff
-    except ImportError as error:
-        raise DiagnosisError("is a universal file, which needs the extra [uff]: pip install pyuff") from error
-    with tempfile.TemporaryDirectory() as folder:
-        path = Path(folder) / "record.uff"
-        path.write_bytes(data)
-        sets = pyuff.UFF(str(path)).read_sets()
-    columns, units, rate = {}, {}, None
-    for place, one in enumerate([sets] if isinstance(sets, dict) else sets, start=1):
-        if one.get("type") != 58 or "data" not in one:
-            continue
-        name = str(one.get("id1") or "").strip() or f"channel {place}"
-        name = f"{name} {place}" if name in columns else name
-        columns[name] = np.real(np.asarray(one["data"])).astype(float)
-        unit = str(one.get("ordinate_axis_units_lab") or "").strip()
-        if unit and unit.upper() != "NONE":
-            units[name] = unit
-        if one.get("abscissa_inc"):
-            rate = 1.0 / float(one["abscissa_inc"])
-    return {"columns": columns, "units": units, "rate_hz": rate}
-
-
-def _without_end(values: Array) -> Array:
-    """Readings down to the last one that is not blank."""
-    return np.asarray(values[: int(np.max(np.flatnonzero(~np.isnan(values)), initial=-1)) + 1])

@@ -145,6 +145,7 @@ def run_up(
     [(2.0, 3.0)]
     """
     error = stated_error(sensor_error, sensor_sigma)
+    value = np.asarray(value, dtype=float)
     cycles = cycle_peaks(value, instants, turns=turns)
     signal = AngleSignal(value, instants.time, instants.step, turns, highest)
     spectra = signal.spectra()

@@ -1,29 +1,84 @@
 """Instants of the samples of a recording: from a rate, or from stamps without their rounding, with gaps."""
 
 import math
+import re
 from typing import NamedTuple
 
 import numpy as np
 
 from chaosgym.arrays import Array
 from chaosgym.errors import DiagnosisError
-from chaosgym.recordings.columns import choose_time
+from chaosgym.recordings.columns import Signal, is_clock, is_counter, rises
+from chaosgym.recordings.quantities import CLOCK, TIMES
 from chaosgym.recordings.read import Recording
+from chaosgym.units import duration
 
 LONGEST_GAP, UNEVEN = 1.5, 0.2
 """Steps, in mean steps, from which samples are missing, and the deviation that even sampling may have."""
 
+EPOCHS = {1e9: 1.0, 1e12: 1e-3, 1e15: 1e-6, 1e18: 1e-9}
+"""Seconds in a unit of the clocks that count from 1970, by the smallest of their readings: those of September 2001."""
+
+AGREE, SLOW = 0.02, 0.1
+"""Relative deviation of two sampling rates that are the same, and the step [s] from which stamps need a unit."""
+
+
+class Even(NamedTuple):
+    """Instants [s] in equal steps: the first one, the step, and how many there are."""
+
+    first: float
+    step: float
+    size: int
+
 
 class Sampling(NamedTuple):
-    """Instants [s] of the samples, the step between them, and gaps in words."""
+    """Instants [s] of the samples, the step between them, gaps in words, and where the step comes from."""
 
-    time: Array
+    instants: Array | Even
     step: float
     gaps: tuple[str, ...]
+    origin: str = ""
+
+    def __str__(self) -> str:
+        return f"{duration(self.step * self.size)} at {1.0 / self.step:.6g} Hz {self.origin}".rstrip()
+
+    @property
+    def size(self) -> int:
+        """Number of samples."""
+        return self.instants.size
+
+    @property
+    def time(self) -> Array:
+        """Instants [s], (n,)."""
+        return self.part(0, self.size)
+
+    def part(self, first: int, last: int) -> Array:
+        """Instants [s] of the samples from one place to before another."""
+        if isinstance(self.instants, Even):
+            return np.asarray(self.instants.first + self.step * np.arange(first, min(last, self.size)))
+        return self.instants[first:last]
+
+    def at(self, place: int) -> float:
+        """Instant [s] of one sample; a negative place counts from the last one."""
+        place %= self.size
+        return float(self.part(place, place + 1)[0])
+
+    def places(self, instants: Array) -> list[int]:
+        """Place of the first sample at or after each instant."""
+        if not isinstance(self.instants, Even):
+            return np.searchsorted(self.instants, instants).tolist()  # type: ignore[no-any-return]
+        places = np.ceil((instants - self.instants.first) / self.step)
+        return np.clip(places, 0, self.size).astype(int).tolist()  # type: ignore[no-any-return]
+
+    def shortened(self, size: int) -> "Sampling":
+        """The first samples."""
+        if isinstance(self.instants, Even):
+            return self._replace(instants=self.instants._replace(size=min(size, self.size)))
+        return self._replace(instants=self.instants[:size])
 
 
-def sampling(recording: Recording, size: int, rate_hz: float | None = None) -> Sampling:
-    """Instants of the samples, from the given rate, the file's own, or its time column.
+def sampling(recording: Recording, size: int, rate_hz: float | None = None, column: str | None = None) -> Sampling:
+    """Instants of the samples, from the given rate, a time column, or the rate that the file states.
 
     Parameters
     ----------
@@ -33,27 +88,127 @@ def sampling(recording: Recording, size: int, rate_hz: float | None = None) -> S
         Number of samples.
     rate_hz
         Sampling rate [Hz], if it is known.
+    column
+        That was sampled; its own rate counts before those of the file.
 
     Raises
     ------
     DiagnosisError
-        If there is neither, or the stamps fall, or their steps differ by more than rounding.
+        If there is none, or the file states several rates, or the stamps fall, or their steps differ by more than
+        rounding, or their unit can't be told.
     """
-    stamps = None if rate_hz is not None else choose_time(recording, told=recording.rate_hz is not None)
-    rate = rate_hz if rate_hz is not None else recording.rate_hz
-    if rate is not None and stamps is None:
-        if not (math.isfinite(rate) and rate > 0.0):
-            raise DiagnosisError(f"rate = {rate:g} Hz is out of range; allowed: above 0")
-        return Sampling(np.arange(size) / rate, 1.0 / rate, ())
-    if stamps is None:
+    if rate_hz is not None:
+        return _at(rate_hz, size, "as stated")
+    own = recording.rates.get(column or "")
+    rates = dict(recording.rates) if column is None or own is None else {column: own}
+    stamps = choose_time(recording, told=bool(rates), rate_hz=recording.rate_hz)
+    if stamps is not None:
+        even = even_sampling(stamps.values[:size], recording)
+        return even._replace(origin=f"by {stamps.described}{even.origin}")
+    if not rates:
         raise DiagnosisError(
             f"{recording.source} has no time column; use --rate-hz, or name the time column 'time [s]'"
         )
-    return even_sampling(stamps.values[:size], recording)
+    key, rate = next(iter(rates.items()))
+    if not np.allclose(list(rates.values()), rate, rtol=1e-6, atol=0.0):
+        listed = ", ".join(f"{key} = {rate:.6g} Hz" for key, rate in rates.items())
+        raise DiagnosisError(f"{recording.source} states several rates: {listed}; use --rate-hz")
+    return _at(rate, size, "by the channel" if key in recording.columns else f"by {key!r}")
+
+
+def _at(rate: float, size: int, origin: str) -> Sampling:
+    if not (math.isfinite(rate) and rate > 0.0):
+        raise DiagnosisError(f"rate = {rate:g} Hz is out of range; allowed: above 0")
+    return Sampling(Even(0.0, 1.0 / rate, size), 1.0 / rate, (), origin)
+
+
+def choose_time(recording: Recording, *, told: bool = False, rate_hz: float | None = None) -> Signal | None:
+    """Time stamps [s], if a column holds them: by its unit, its name, or as the one that rises like a clock.
+
+    With ``told`` only those that unit or name tell. A column that counts one by one is no clock. Stamps without a
+    unit are of the one that fits ``rate_hz``, of the years since 1970, or seconds.
+
+    Raises
+    ------
+    DiagnosisError
+        If the stamps can't be used, or their unit can't be told.
+    """
+    name = _clock(recording, told)
+    if name is None:
+        return None
+    if name in recording.problems or name in recording.doubts:
+        reason = recording.problems.get(name) or f"column {name!r} {recording.doubts[name]}"
+        raise DiagnosisError(f"{recording.source}, {reason}")
+    values, unit = recording.columns[name].astype(float), recording.units.get(name, "")
+    if unit and unit in TIMES:
+        values, shown = values * TIMES[unit], f"column {name!r} [{unit}]"
+    else:
+        size, how = _size(recording, name, rate_hz)
+        values, shown = (values - values[0]) * size, f"column {name!r} [{how}]"
+    if (fraction := _milliseconds(recording, name, values)) is not None:
+        values, shown = values + 1e-3 * recording.columns[fraction], f"{shown} and {fraction!r} [ms]"
+    return Signal(values, name, shown, "s")
+
+
+def _clock(recording: Recording, told: bool) -> str | None:
+    """Name of the column of instants."""
+    columns, units = recording.columns, recording.units
+    fits = [name for name in columns if units.get(name, "") in TIMES]
+    named = [name for name in columns if any(map(CLOCK.fullmatch, re.split(r"[\W_\d]+", name)))]
+    rising = [name for name in [*fits, *named] if rises(columns[name])]
+    if not rising and len(columns) > 1 and not told:
+        rising = [
+            name for name in columns if is_clock(columns[name]) and not units.get(name) and not _counts(columns[name])
+        ]
+    return next(iter([*rising, *fits]), None)
+
+
+def _counts(values: Array) -> bool:
+    """Whether values are whole numbers in steps of one."""
+    return is_counter(values) and bool(values[1] - values[0] == 1.0 and values[0] == round(float(values[0])))
+
+
+def _size(recording: Recording, name: str, rate_hz: float | None) -> tuple[float, str]:
+    """Seconds in a unit of stamps that state none, and how that is known.
+
+    Raises
+    ------
+    DiagnosisError
+        If they step so far that they may count parts of a second.
+    """
+    values = recording.columns[name].astype(float)
+    step, typical = float(values[-1] - values[0]) / max(1, len(values) - 1), float(np.median(np.diff(values)))
+    if rate_hz is not None and step > 0.0:
+        for unit in ("s", "ms", "us", "ns"):
+            if abs(step * TIMES[unit] * rate_hz - 1.0) < AGREE:
+                return TIMES[unit], f"{unit}, by the stated rate of {rate_hz:.6g} Hz"
+    for least, size in EPOCHS.items():
+        if least <= values[0] and values[-1] < 3.0 * least and typical * size < 2.0:
+            return size, f"{duration(size).removeprefix('1 ')} since 1970"
+    if typical >= SLOW * (1.0 - 1e-9):
+        raise DiagnosisError(
+            f"{recording.source}: column {name!r} rises in steps of {typical:.6g} without a unit; name it "
+            f"'{name} [ms]' or '{name} [s]', or use --rate-hz, {1e3 / typical:.6g} if these are milliseconds"
+        )
+    return 1.0, "no unit, taken as s"
+
+
+def _milliseconds(recording: Recording, name: str, stamps: Array) -> str | None:
+    """Column that holds the milliseconds within the whole seconds of the stamps."""
+    if not np.array_equal(stamps, np.round(stamps)):
+        return None
+    for other, values in recording.columns.items():
+        if other != name and recording.units.get(other) == "ms" and len(values) == len(stamps):
+            whole = np.array_equal(values, np.round(values)) and values.min() >= 0.0 and values.max() < 1000.0
+            if whole and np.any(np.diff(values) < 0.0):
+                return other
+    return None
 
 
 def even_sampling(stamps: Array, recording: Recording) -> Sampling:
     """Instants without the rounding of their stamps; gaps are kept.
+
+    Where many samples share a stamp, the changes of the stamp give the step.
 
     Raises
     ------
@@ -65,26 +220,52 @@ def even_sampling(stamps: Array, recording: Recording) -> Sampling:
     if len(steps) < 2 or len(falling):
         where = recording.where(int(falling[0]) + 1) if len(falling) else recording.where(0)
         raise DiagnosisError(f"{recording.source}, {where}: time does not rise; allowed: one series in increasing time")
+    changes = np.flatnonzero(steps > 0.0) + 1
+    if np.count_nonzero(steps > 0.0) < len(steps) / 3:
+        return _within_stamps(stamps, changes.tolist(), recording)
     rounding = _rounding(stamps)
     typical = float(np.median(steps))
     typical = float(np.mean(steps[steps <= LONGEST_GAP * typical + 2.0 * rounding]))
-    if typical <= 0.0:
-        raise DiagnosisError(f"{recording.source}: the time stamps are too coarse to tell samples apart; use --rate-hz")
     gap = steps > LONGEST_GAP * typical + 1.01 * rounding
     odd = np.flatnonzero((np.abs(steps - typical) > UNEVEN * typical + 1.01 * rounding) & ~gap)
     if len(odd) or gap.mean() > 0.1:
         first = int(odd[0] if len(odd) else np.flatnonzero(gap)[0])
         raise DiagnosisError(
-            f"{recording.source}, {recording.where(first + 1)}: sampled unevenly, a step of {steps[first]:.4g} s where "
-            f"{typical:.4g} s are usual; resample at equal steps"
+            f"{recording.source}, {recording.where(first + 1)}: sampled unevenly, a step of {duration(steps[first])} "
+            f"where {duration(typical)} are usual; resample at equal steps"
         )
     counted = np.where(gap, np.round(steps / typical), 1.0)
     order = np.concatenate([[0.0], np.cumsum(counted)])
     step = float((stamps[-1] - stamps[0]) / order[-1])
     told = tuple(
-        f"{recording.where(int(place) + 1)}: a gap of {steps[place]:.4g} s" for place in np.flatnonzero(gap)[:5]
+        f"{recording.where(int(place) + 1)}: a gap of {duration(steps[place])}" for place in np.flatnonzero(gap)[:5]
     )
     return Sampling(stamps[0] + order * step, step, told)
+
+
+def _within_stamps(stamps: Array, changes: list[int], recording: Recording) -> Sampling:
+    """Instants of samples of which three and more share a stamp: as many in each, but for the first and the last.
+
+    Raises
+    ------
+    DiagnosisError
+        If fewer than three stamps are whole, or these hold unlike numbers of samples.
+    """
+    if len(changes) < 4:
+        raise DiagnosisError(f"{recording.source}: the time stamps are too coarse to tell samples apart; use --rate-hz")
+    counts, spans = np.diff(changes), np.diff(stamps[changes])
+    step = float(spans.sum() / counts.sum())
+    odd = np.flatnonzero(np.abs(counts - spans / step) > 1.0 + UNEVEN * spans / step)
+    if len(odd):
+        place = int(odd[0])
+        raise DiagnosisError(
+            f"{recording.source}, {recording.where(changes[place])}: {counts[place]} samples within "
+            f"{duration(spans[place])}, where {spans[place] / step:.4g} are usual; resample at equal steps, or use "
+            "--rate-hz"
+        )
+    first = float(stamps[changes[0]]) - step * changes[0]
+    origin = f", whose stamps of {duration(float(np.median(spans)))} hold {np.median(counts):.6g} samples each"
+    return Sampling(Even(first, step, len(stamps)), step, (), origin)
 
 
 def _rounding(stamps: Array) -> float:

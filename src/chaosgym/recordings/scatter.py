@@ -158,7 +158,12 @@ def _judge(found: Scatter, told: SensorError | None, resolved: float) -> Measure
     if torus is not None:
         return torus
     if len(found.readings) < CHAOTIC_CYCLES:
-        return _open(found, f"{_beyond(found, told)}: {len(found.readings)} cycles are too few to tell why", told)
+        return _open(
+            found,
+            f"{_beyond(found, told)}: {len(found.readings)} cycles are too few to tell why",
+            told,
+            ["more cycles"],
+        )
     fitted = determinism(found.readings)
     if is_chaotic([found], fitted):
         return chaotic([found], fitted, told)
@@ -252,12 +257,11 @@ def _cannot_tell(found: Scatter, told: SensorError | None) -> MeasuredVerdict:
     ask = ["the sensor's error"] if told is None else []
     ask += ["more cycles"] if len(found.readings) < MORE_CYCLES else []
     ask += ["a second sensor", "another speed", "the machine's model"]
-    tell = f"{', '.join(ask[:-1])} or {ask[-1]} would tell"
-    return _open(found, f"{_beyond(found, told)}: random or chaotic, this record cannot tell; {tell}", told)
+    return _open(found, f"{_beyond(found, told)}: random or chaotic, this record cannot tell", told, ask)
 
 
-def _open(found: Scatter, reason: str, error: SensorError | None) -> MeasuredVerdict:
-    return MeasuredVerdict(undetermined(reason, found.readings, **found.evidence()), error)
+def _open(found: Scatter, reason: str, error: SensorError | None, tells_more: Sequence[str] = ()) -> MeasuredVerdict:
+    return MeasuredVerdict(undetermined(reason, found.readings, tuple(tells_more), **found.evidence()), error)
 
 
 def is_chaotic(several: Sequence[Scatter], fitted: Determinism) -> bool:

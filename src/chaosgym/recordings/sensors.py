@@ -76,11 +76,12 @@ def _asked_together(alone: Sequence[MeasuredVerdict], peaks: Array, names: Seque
         return alone[0]
     several = _scatters(peaks)
     if several is None or len(peaks) < CHAOTIC_CYCLES:
-        return _open(f"no sensor decides: {alone[0].diagnosis.reason}", peaks, alone)
+        first = alone[0].diagnosis
+        return _open(f"no sensor decides: {first.reason}", peaks, alone, first.tells_more)
     fitted = determinism(np.column_stack([found.readings for found in several]))
     if not is_chaotic(several, fitted):
         reason = f"{' and '.join(names)} together: random or chaotic, these sensors cannot tell"
-        return _open(f"{reason}; more cycles, another speed or the machine's model would tell", peaks, alone)
+        return _open(reason, peaks, alone, ("more cycles", "another speed", "the machine's model"))
     found = chaotic(several, fitted, None, [names[place] for place in fitted.order])
     widest = max(several, key=lambda one: one.relative)
     return replace(found, scatter=widest.sigma, coefficient_of_variation=widest.relative, unit=alone[0].unit)
@@ -97,5 +98,7 @@ def _scatters(peaks: Array) -> list[Scatter] | None:
     return found
 
 
-def _open(reason: str, peaks: Array, alone: Sequence[MeasuredVerdict]) -> MeasuredVerdict:
-    return MeasuredVerdict(undetermined(reason, peaks), alone[0].error, unit=alone[0].unit)
+def _open(
+    reason: str, peaks: Array, alone: Sequence[MeasuredVerdict], tells_more: tuple[str, ...] = ()
+) -> MeasuredVerdict:
+    return MeasuredVerdict(undetermined(reason, peaks, tells_more), alone[0].error, unit=alone[0].unit)

@@ -8,8 +8,8 @@ from collections.abc import Iterable, Iterator
 import numpy as np
 
 from chaosgym.errors import DiagnosisError
-from chaosgym.recordings.columns import FORCES, calibration
-from chaosgym.recordings.heading import split_unit
+from chaosgym.recordings.columns import calibration
+from chaosgym.recordings.quantities import FORCES, as_unit, split_unit
 from chaosgym.recordings.text import COMMENT, NUMBER, QUOTED, TORN
 
 AMBIGUOUS = re.compile(r"[+-]?\d{1,3},\d{3}")
@@ -48,7 +48,7 @@ class LineReader:
         if self.scale:
             factor, target = calibration(self.scale, written)
         else:
-            factor, target = FORCES.get(written or "N", 0.0), "N"
+            factor, target = FORCES.get(as_unit(written) or written or "N", 0.0), "N"
         if target != "N" or not factor:
             raise DiagnosisError(
                 f"the monitor asks for forces; allowed: --unit {', '.join(FORCES)}, or --scale '100 mV/N'"

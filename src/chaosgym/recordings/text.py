@@ -15,6 +15,8 @@ import pyarrow.csv
 from chaosgym.arrays import Array
 from chaosgym.errors import DiagnosisError
 from chaosgym.recordings.heading import Heading, read_heading
+from chaosgym.recordings.naming import MOST_MISSING
+from chaosgym.recordings.raw import Column, Data, Raw
 
 DELIMITERS = {"\t": "tabs", ";": "semicolons", "|": "bars", ",": "commas", " ": "blanks"}
 """Delimiters in the order in which they are tried."""
@@ -27,9 +29,6 @@ MOST_COLUMNS = 4096
 
 FOOTER, FEWEST_BEFORE_FOOTER = 50, 20
 """Most lines without numbers that may follow the data, and fewest lines of data before them."""
-
-MOST_MISSING = 0.02
-"""Share of the readings that a recorder may have marked as missing."""
 
 MISSING = re.compile(
     r"[+-]?1?\.?#(QNAN|SNAN|IND|INF)0*|#?N/?[AV]|#NUM!|#DIV/0!|#VALUE!|n\.?a\.?|nan|null|none|OVR|OVL|OL|OVER(LOAD|FLOW|RANGE)?|"
@@ -48,12 +47,12 @@ TORN = re.compile(r'\s*"\s*[+-]?[\d.,]')
 NUMBER = re.compile(r"[+-]?(\d+[.,]?\d*|[.,]\d+)([eE][+-]?\d+)?|[+-]?(nan|inf(inity)?)", re.IGNORECASE)
 
 
-def read_text(data: bytes) -> dict[str, Any]:
-    """Columns, units, problems, lines, rate and form of a text, as ``Recording`` names them.
+def read_text(data: Data) -> Raw:
+    """Columns of a text with what stands above them.
 
     Data begin where all columns that the end of the file has hold numbers; what stands above names them.
     """
-    text = _decoded(data)
+    text = _decoded(bytes(data))
     if "\0" in text:
         raise DiagnosisError("is neither text nor a format that is known (CSV, Parquet, .npy, .mat, WAV, UFF)")
     written = [(number, line.rstrip("\r")) for number, line in enumerate(text.split("\n"), start=1)]
@@ -65,6 +64,8 @@ def read_text(data: bytes) -> dict[str, Any]:
     if not kept:
         raise DiagnosisError("holds no numbers")
     delimiter = _delimiter([line for _, line in kept])
+    if delimiter == ",":
+        kept = _without_thousands(kept)
     if delimiter == " ":
         kept = [(number, "\t".join(line.split())) for number, line in kept]
     mark = "\t" if delimiter == " " else delimiter
@@ -72,40 +73,31 @@ def read_text(data: bytes) -> dict[str, Any]:
     if width > MOST_COLUMNS:
         raise DiagnosisError(f"has {width} columns; allowed: {MOST_COLUMNS}; keep those of forces, times and speeds")
     start, end, steady = _body([line for _, line in kept], mark, width)
-    body = kept[start:end]
+    above = {line for _, line in kept[:start]}
+    again = [number for number, line in kept[start:end] if line in above]
+    body = [(number, line) for number, line in kept[start:end] if line not in above]
     heading = _heading(written[: body[0][0] - 1], body, width, None if delimiter == " " else mark)
-    titles = heading.names or [f"column {place + 1}" for place in range(width)]
+    titles = heading.titles or [f"column {place + 1}" for place in range(width)]
     if len(set(titles)) != len(titles):
         raise DiagnosisError(f"names two columns alike: {', '.join(titles)}")
     lines = tuple(number for number, _ in body)
     torn = [number for number, line in body if line.count('"') % 2]
     table = _table([(number, line.replace('"', "")) for number, line in body] if torn else body, titles, mark)
     comma = delimiter != "," and _decimal_comma([v or "" for column in table.columns for v in column[:50].to_pylist()])
-    columns: dict[str, Array] = {}
-    problems, units = dict[str, str](), dict(heading.units)
-    for title, column, held in zip(titles, table.columns, steady, strict=True):
+    columns = []
+    for title, unit, column, held in zip(titles, heading.units, table.columns, steady, strict=True):
         values, problem = _entries(column, comma, lines)
         if torn:
             problem = f"line {torn[0]}: a quote is not closed, as in {len(torn)} of {len(lines)} lines"
-        if values is None or (problem and not heading.names and not held and any(steady)):
-            continue
-        columns[title] = values
-        if problem:
-            problems[title] = problem
-        if _is_instant(str(column[0])):
-            units[title] = "s"
+        if heading.titles or held or not (problem or values is None) or not any(steady):
+            instant = values is not None and _is_instant(str(column[0]))
+            columns.append(Column(title, values, {"unit": "s" if instant else unit}, problem=problem))
     form = "CSV" if width == 1 else f"CSV, {DELIMITERS[delimiter]}"
     form += ", decimal comma" if comma else ""
     form += f", {len(kept) - end} lines from line {kept[end][0]} on left out" if end < len(kept) else ""
-    return {
-        "columns": columns,
-        "units": {title: unit for title, unit in units.items() if unit},
-        "problems": problems,
-        "lines": lines,
-        "rate_hz": heading.rate_hz,
-        "form": form,
-        "named": bool(heading.names),
-    }
+    if again:
+        form += f", a heading repeated amid the data left out, first in line {again[0]}"
+    return Raw(form, columns, heading.stated, lines, bool(heading.titles))
 
 
 def _heading(above: list[tuple[int, str]], body: list[tuple[int, str]], width: int, mark: str | None) -> Heading:
@@ -196,6 +188,32 @@ def _two_columns(heading: str, rows: list[list[str]]) -> bool:
     return steps == {1} or len(rows) < 2
 
 
+GROUPS = re.compile(r'"([+-]?\d{1,3}(?:,\d{3})+(?:\.\d*)?|[+-]?\d+,\d+)"')
+"""A number in quotes with commas."""
+
+
+def _without_thousands(lines: list[tuple[int, str]]) -> list[tuple[int, str]]:
+    """Lines with commas between columns, where numbers in quotes have points only: ``0.1,"1,000.12"``.
+
+    Raises
+    ------
+    DiagnosisError
+        If these commas may be those of thousands as well as decimal ones.
+    """
+    quoted = [(number, word) for number, line in lines if '"' in line for word in GROUPS.findall(line)]
+    if not quoted:
+        return lines
+    decimal = any(re.fullmatch(r"[+-]?(\d{4,},\d+|\d+,(\d{1,2}|\d{4,}))", word) for _, word in quoted)
+    thousands = any(re.search(r",\d{3}[,.]", word) for _, word in quoted)
+    thousands = thousands or any(re.search(r"(^|,)[+-]?\d+\.\d+(,|$)", line) for _, line in lines)
+    if decimal == thousands:
+        number, word = quoted[0]
+        both = f"{word.replace(',', '')} or {word.replace(',', '.')}"
+        raise DiagnosisError(f"line {number}: {word!r} may be {both}; write numbers without separators of thousands")
+    mark = "." if decimal else ""
+    return [(number, GROUPS.sub(lambda word: word[1].replace(",", mark), line)) for number, line in lines]
+
+
 def _is_number(text: str) -> bool:
     return NUMBER.fullmatch(text.strip()) is not None
 
@@ -276,7 +294,7 @@ def _entries(column: Any, comma: bool, lines: tuple[int, ...]) -> tuple[Array | 
 
 
 def _numbers(column: Any, comma: bool, lines: tuple[int, ...]) -> tuple[Array | None, str]:
-    """(readings down to the last entry, what is wrong with them); no readings if the column is text.
+    """(readings, what is wrong with those down to the last entry); no readings if the column is text.
 
     Entries that a recorder marks as missing, and blanks, are NaN; more than a few of them are a problem.
     """
@@ -292,11 +310,12 @@ def _numbers(column: Any, comma: bool, lines: tuple[int, ...]) -> tuple[Array | 
     good = pc.match_substring_regex(text, r"(?i)^([+-]?(\d+\.?\d*|\.\d+)(e[+-]?\d+)?|[+-]?(nan|inf(inity)?))$")
     good = good.to_numpy(zero_copy_only=False)
     if size and good.sum() < 0.5 * np.count_nonzero(filled[:size]):
-        return None, ""
-    values = np.full(size, np.nan)
-    values[good] = text.filter(pa.array(good)).cast(pa.float64()).to_numpy(zero_copy_only=False)
+        place = int(np.flatnonzero(filled[:size] & ~good)[0])
+        return None, f"holds text: {str(text[place])[:40]!r} in line {lines[place]}"
+    values = np.full(len(column), np.nan)
+    values[:size][good] = text.filter(pa.array(good)).cast(pa.float64()).to_numpy(zero_copy_only=False)
     values[~np.isfinite(values)] = np.nan
-    bad = np.flatnonzero(np.isnan(values))
+    bad = np.flatnonzero(np.isnan(values[:size]))
     wrong = [place for place in bad if (entry := str(text[int(place)])) and not MISSING.fullmatch(entry)]
     if wrong or len(bad) > MOST_MISSING * size:
         place = int(wrong[0] if wrong else bad[0])

@@ -235,8 +235,7 @@ def read_sweep(folder: str | Path, columns: list[str] | None = None) -> Labelled
     path = Path(folder) / DATA_FILE
     if not path.is_file():
         raise DatasetError(
-            f"{folder} holds no finished sweep (no {DATA_FILE}); run `chaosgym sweep` again to finish it, or "
-            "`chaosgym dataset build MACHINE` for a whole dataset of the repository"
+            f"{folder} holds no finished sweep (no {DATA_FILE}); run `chaosgym sweep` again to finish it"
         )
     try:
         return _understood(parquet_of(path, columns))

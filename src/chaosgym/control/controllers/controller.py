@@ -11,13 +11,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from chaosgym.arrays import Array
+from chaosgym.envs.kernels.steps import PLACE
 from chaosgym.envs.memory import irregularity
-from chaosgym.envs.observation import OBSERVATION_NAMES, observation_names
 from chaosgym.envs.task import Task
 
 Observations = NDArray[np.float32]
-
-_PLACE = {name: place for place, name in enumerate(OBSERVATION_NAMES)}
 
 
 class Controller:
@@ -47,8 +45,7 @@ class Controller:
         """Return the actions (n, 1)."""
         speeds = self.speeds(observations)
         if self.task.drive == "motor":  # the set-point is ahead by what the motor slipped in the last step
-            set_point = observation_names(self.task).index("set_point")
-            speeds = speeds + observations[:, set_point] - seen(observations, "speed")
+            speeds = speeds + added(observations, self.task, "set_point") - seen(observations, "speed")
         speeds = np.clip(speeds, self.task.lowest_speed, self.task.highest_speed)
         return speeds[:, None].astype(np.float32)
 
@@ -64,8 +61,13 @@ class Controller:
 
 
 def seen(observations: Observations, name: str) -> Array:
-    """One entry of the observations, (n,)."""
-    return observations[:, _PLACE[name]].astype(float)
+    """One entry that every observation has, (n,)."""
+    return observations[:, getattr(PLACE, name)].astype(float)
+
+
+def added(observations: Observations, task: Task, name: str) -> Array:
+    """One entry that a keyword of the task adds to the observations, (n,)."""
+    return observations[:, task.places[name]].astype(float)
 
 
 def place_of(speeds: Array, task: Task) -> NDArray[np.int64]:
@@ -89,6 +91,6 @@ def irregular(observations: Observations, task: Task, threshold: float, softness
     Where the task gives the trained classifier's, 1 if that is sure and 0 if not.
     """
     if task.classifier == "on":
-        return (observations[:, -1] > SURE).astype(float)
-    felt = irregularity(observations) / max(task.sensor_error, 1e-3 * task.load_rating)
+        return (added(observations, task, "irregular_probability") > SURE).astype(float)
+    felt = irregularity(observations) / max(task.sensor_error, 1e-3 * task.reference_force)
     return np.asarray(0.5 + 0.5 * np.tanh(0.5 * (felt - threshold) / softness))

@@ -82,8 +82,8 @@ class Kriging(Controller):
     ----------
     price
         Share of the range of speed that the life of a step at usual load is worth; 2/3 is that of ``objective="life"``
-        on the beam. None is what the task charges, by its own weights and load rating: under ``"irregular"`` life is
-        worth next to nothing, and the rule follows the demand.
+        on the beam. None is what the task charges, by its own weights and reference force: under ``"irregular"`` life
+        is worth next to nothing, and the rule follows the demand.
 
     Examples
     --------
@@ -130,10 +130,10 @@ class Kriging(Controller):
         """Logarithm of what the life of a step costs at each speed, (n, s), if its load is the mean."""
         task = self.task
         if self.price is None:
-            life = task.damage_weight * task.life_share / task.steps
+            life = task.damage_weight * task.reference_damage / task.steps
             distance = task.deviation_weight * (task.grid[-1] - task.grid[0])
             return np.asarray(
-                LIFE_EXPONENT * (mean - np.log(task.load_rating)) + np.log(max(life, 1e-9) / max(distance, 1e-9))
+                LIFE_EXPONENT * (mean - np.log(task.reference_force)) + np.log(max(life, 1e-9) / max(distance, 1e-9))
             )
         above = LIFE_EXPONENT * (mean - mean.max(axis=1, keepdims=True))
         usual = np.average(np.exp(above), axis=1, weights=self._asked)
@@ -146,7 +146,7 @@ class Kriging(Controller):
 
     def _feel(self, observations: Observations) -> None:
         task, every = self.task, np.arange(self.count)
-        least = max(task.sensor_error, 1e-3 * task.load_rating)
+        least = max(task.sensor_error, 1e-3 * task.reference_force)
         place = place_of(seen(observations, "speed"), task)
         self._counts[every, place] += 1.0
         weight = np.maximum(LATEST, 1.0 / self._counts[every, place])

@@ -258,7 +258,7 @@ class Belief(Controller):
         held = np.abs(speed - self._speed) < 0.5 * self.task.trim_step
         self._speed = speed
         place = self.fleet.nearest(speed)
-        error = self.spread * max(self.task.sensor_error, 1e-3 * self.task.load_rating)
+        error = self.spread * max(self.task.sensor_error, 1e-3 * self.task.reference_force)
         miss = (seen(observations, "mean_peak_force")[:, None] - self.fleet.mean_peak[:, place].T) / error
         self._fit -= self.temper * np.where(held[:, None], np.log1p(0.5 * miss**2), 0.0)
         weight = np.exp(self._fit - self._fit.max(axis=1, keepdims=True))

@@ -47,7 +47,7 @@ class Tables(NamedTuple):
 
 
 def readings_of(observations: NDArray[Any]) -> Array:
-    """Readings (n, 5) of observations (n, 14) from which the clearance is inferred."""
+    """Readings (n, 5) of observations (n, entries) from which the clearance is inferred."""
     felt = np.column_stack([seen(observations, name) for name in READINGS])
     return np.column_stack([np.log(felt[:, :3] + (1.0, 0.3, 0.3)), felt[:, 3:]])
 
@@ -128,7 +128,11 @@ class Table(Controller):
         self._last = speed
         chance = np.exp(self._fit - self._fit.max(axis=1, keepdims=True))
         chance /= chance.sum(axis=1, keepdims=True)
-        lost = damage_in_a_million(chance @ self.tables.mean_peak.T, task.load_rating) * task.life_share / task.steps
+        lost = (
+            damage_in_a_million(chance @ self.tables.mean_peak.T, task.reference_force)
+            * task.reference_damage
+            / task.steps
+        )
         cost = self.cost(chance @ self.tables.share.T, lost, demand, grid)
         cost[np.arange(self.count), place] -= STAYING * task.type_iii_weight
         cost[np.abs(grid - demand[:, None]) > task.largest_trim + 0.5 * task.trim_step] = np.inf

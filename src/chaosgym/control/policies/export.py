@@ -11,7 +11,6 @@ from gymnasium.spaces import Discrete
 
 from chaosgym.control.policies.network import Dense, Lstm, Network
 from chaosgym.control.policies.policy import Normalisation, TrainedPolicy
-from chaosgym.envs.observation import asked_of
 from chaosgym.errors import ModelFileError
 
 
@@ -60,6 +59,7 @@ def exported(model: Any, env: str, envs: Any, *, memory: bool = False) -> Traine
         while not hasattr(inner, "memory"):
             inner = inner.venv
         usual = inner.memory.usual
+    task = envs.get_attr("task")[0]
     return TrainedPolicy(
         env=env,
         action="trim" if isinstance(model.action_space, Discrete) else "continuous",
@@ -68,8 +68,8 @@ def exported(model: Any, env: str, envs: Any, *, memory: bool = False) -> Traine
         usual=usual,
         squashed=bool(model.policy.squash_output),
         machine=envs.get_attr("nominal")[0].definition,
-        asked=asked_of(envs.get_attr("task")[0]),
-        cycles_per_step=envs.get_attr("task")[0].cycles_per_step,
+        observes=tuple(task.places),
+        cycles_per_step=task.cycles_per_step,
     )
 
 

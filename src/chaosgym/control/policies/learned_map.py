@@ -39,7 +39,7 @@ AFRESH = 0.5
 
 
 def readings_of(observations: NDArray[Any], task: Task) -> Array:
-    """Readings (n, 5) of observations (n, 14)."""
+    """Readings (n, 5) of observations (n, entries)."""
     forces = [seen(observations, "mean_peak_force"), seen(observations, "std_peak_force"), irregularity(observations)]
     others = [seen(observations, "impacts_per_cycle"), seen(observations, "bouncing_share")]
     return np.column_stack([*np.log(np.column_stack(forces) + task.sensor_error * NOISE).T, *others])
@@ -70,7 +70,7 @@ class FeltSpeeds:
         self.settled = np.zeros(count, np.bool_)
 
     def add(self, observations: Observations) -> NDArray[np.float32]:
-        """Take in a step (N, 14); return all that is remembered and the share of the job to do, (N, 7 speeds + 1)."""
+        """Take in a step (N, entries); return what is remembered and the share of the job to do, (N, 7 speeds + 1)."""
         speed = seen(observations, "speed")
         place = place_of(speed, self.task)
         readings = (readings_of(observations, self.task) - self.mean[place]) / self.deviation[place]
@@ -84,7 +84,7 @@ class FeltSpeeds:
         self._felt[self._jobs, place, 1] = self.settled | had
         mixed = (1.0 - weight) * before[:, 2:] + weight * readings.clip(-LARGEST, LARGEST)
         self._felt[self._jobs, place, 2:] = mixed
-        left = observations[:, 4:5].astype(np.float32)
+        left = seen(observations, "remaining_share")[:, None].astype(np.float32)
         return np.concatenate([self._felt.reshape(len(speed), -1), left], axis=1)
 
 
@@ -179,7 +179,7 @@ class LearnedMap(Controller):
         answer, _ = self.network(self._felt.add(observations), None)
         share = 0.5 + 0.5 * np.tanh(0.5 * answer[:, : len(grid)].astype(float))
         peak = np.exp(answer[:, len(grid) :].astype(float).clip(-10.0, 20.0))
-        lost = damage_in_a_million(peak, task.load_rating) * task.life_share / task.steps
+        lost = damage_in_a_million(peak, task.reference_force) * task.reference_damage / task.steps
         demand = seen(observations, "demand")
         cost = self.cost(share, lost, demand, grid)
         cost[np.abs(grid - demand[:, None]) > task.largest_trim + 0.5 * task.trim_step] = np.inf

@@ -5,6 +5,7 @@ chaosgym.evaluate(policy, "chaosgym/ImpactBeamTolerance-v1")
 """
 
 import json
+from collections.abc import Mapping
 from dataclasses import dataclass, field
 from hashlib import sha256
 from io import BytesIO
@@ -18,8 +19,9 @@ from chaosgym.control.policies.learned_map import LearnedMap, warn_of_other_step
 from chaosgym.control.policies.network import Dense, Lstm, Network, State
 from chaosgym.envs import environment
 from chaosgym.envs.drive import BACK
+from chaosgym.envs.entries import keywords_of
 from chaosgym.envs.memory import SpeedMemory, Usual
-from chaosgym.envs.observation import ASKED, OBSERVATION_NAMES, asked_of
+from chaosgym.envs.observation import OBSERVATION_NAMES
 from chaosgym.envs.task import Task
 from chaosgym.errors import ModelFileError, ParameterError
 from chaosgym.files import DAMAGE, contents, unpacked, write_atomically
@@ -36,6 +38,9 @@ DESCRIPTION, WEIGHTS = "policy.json", "weights.npz"
 
 ACTIONS = {"trim": BACK + 1, "continuous": 2}
 """Numbers that the network answers with, by the kind of action: the largest one decides, or they are the action."""
+
+ADDED = {entry.name: (keyword, value) for keyword, (value, entry) in keywords_of(Task).items()}
+"""Entries that not every observation has: the keyword of the environment, and its value, that add each."""
 
 
 class Normalisation(NamedTuple):
@@ -69,8 +74,9 @@ class TrainedPolicy:
         For a policy with a ``SpeedMemory``, what is usual at each speed; None for one without a memory.
     squashed
         Whether continuous answers go through tanh; otherwise they are clipped.
-    asked
-        Keywords of the entries that it sees beside the 14 of every observation: of "monitor", "drive" and "classifier".
+    observes
+        Names of the entries that it sees, in their order: those of every observation, or others of a ``Task``'s
+        ``places``. The environment may have more.
     machine
         ``definition`` of the machine that it was trained on; by default the name in the environment's id.
     cycles_per_step
@@ -89,20 +95,23 @@ class TrainedPolicy:
     usual: Usual | None = None
     squashed: bool = False
     machine: str = ""
-    asked: tuple[str, ...] = ()
+    observes: tuple[str, ...] = OBSERVATION_NAMES
     cycles_per_step: int = 0
     knows: str = "measurements"
     _state: State | None = field(default=None, init=False, repr=False)
     _memory: SpeedMemory | None = field(default=None, init=False, repr=False)
+    _width: int = field(init=False, repr=False)
+    _columns: list[int] = field(init=False, repr=False)
 
     def __post_init__(self) -> None:
         if self.action not in ACTIONS:
             raise ModelFileError(f"the kind of actions is {self.action!r}; known: {', '.join(ACTIONS)}")
         self.machine = self.machine or environment(self.env).kwargs["machine"]
-        if self.asked != tuple(keyword for keyword in ASKED if keyword in self.asked):
-            raise ModelFileError(f"it sees {', '.join(self.asked)}; known, in this order: {', '.join(ASKED)}")
-        self._seen = len(OBSERVATION_NAMES) + len(self.asked)
-        size = self._seen + (len(SpeedMemory.names()) if self.usual else 0)
+        known = (*OBSERVATION_NAMES, *ADDED)
+        if not set(self.observes) <= set(known) or len(set(self.observes)) < len(self.observes):
+            raise ModelFileError(f"it sees {', '.join(self.observes)}; allowed, each once: {', '.join(known)}")
+        self._look_at({name: place for place, name in enumerate(self.observes)})
+        size = len(self._columns)
         self.network.check(size, ACTIONS[self.action])
         if self.normalisation:
             for name, values in (("mean", self.normalisation.mean), ("deviation", self.normalisation.deviation)):
@@ -116,7 +125,14 @@ class TrainedPolicy:
     @property
     def keywords(self) -> dict[str, Any]:
         """Keywords of the environment that it plays in."""
-        return {"action": self.action} | {keyword: ASKED[keyword][0] for keyword in self.asked}
+        return {"action": self.action} | dict(ADDED[name] for name in self.observes if name in ADDED)
+
+    def _look_at(self, places: Mapping[str, int]) -> None:
+        """Find the entries that it sees in observations with these ``places``; what is remembered follows them."""
+        self._width = len(places)
+        remembered = len(SpeedMemory.names()) if self.usual else 0
+        own = [places[name] for name in self.observes]
+        self._columns = [*own, *range(self._width, self._width + remembered)]
 
     def start(self, envs: Any) -> None:
         """Begin the jobs of a vector environment that has been reset.
@@ -124,14 +140,9 @@ class TrainedPolicy:
         Raises
         ------
         ModelFileError
-            If it is of another machine, or has another kind of actions.
+            If it is of another machine, has another kind of actions, or sees what the environment does not give.
         """
         here = envs.nominal.definition
-        if asked_of(envs.task) != self.asked:
-            raise ModelFileError(
-                f"the policy sees {', '.join(self.asked) or 'nothing'} beside the usual entries, the environment gives "
-                f"{', '.join(asked_of(envs.task)) or 'none'}; make it with the keywords {self.keywords}"
-            )
         if here != self.machine or envs.task.action != self.action:
             raise ModelFileError(
                 f"the policy was trained on {self.env} (machine {self.machine}) with action={self.action!r}; "
@@ -146,8 +157,17 @@ class TrainedPolicy:
         Raises
         ------
         ModelFileError
-            If it remembers other speeds than those of the task.
+            If it remembers other speeds than those of the task, sees an entry that the task does not give, or sets a
+            motor that it does not see.
         """
+        if task.drive == "motor" and "set_point" not in self.observes:
+            raise ModelFileError("the policy does not see the set_point of a motor; allowed: drive='constant'")
+        if missing := [name for name in self.observes if name not in task.places]:
+            raise ModelFileError(
+                f"the policy sees {', '.join(missing)}, and the environment gives {', '.join(task.places)}; make it "
+                f"with the keywords {self.keywords}"
+            )
+        self._look_at(task.places)
         self._state, self._memory = None, None
         if self.usual:
             if len(self.usual.count) != len(task.grid):
@@ -157,7 +177,7 @@ class TrainedPolicy:
             self._memory = SpeedMemory(task, count, self.usual, learns=False)
 
     def __call__(self, observations: Array) -> Array:
-        """Return the actions (n,) or (n, 2) for observations (n, 14 and what was asked) of as many jobs as started.
+        """Return the actions (n,) or (n, 2) for observations (n, entries) of as many jobs as started.
 
         Raises
         ------
@@ -165,10 +185,11 @@ class TrainedPolicy:
             If an observation is not finite or has another length.
         """
         values = np.asarray(observations, np.float32)
-        if values.shape[1:] != (self._seen,) or not np.isfinite(values).all():
-            raise ParameterError(f"observations have shape {values.shape}; allowed: (n, {self._seen}), all finite")
+        if values.shape[1:] != (self._width,) or not np.isfinite(values).all():
+            raise ParameterError(f"observations have shape {values.shape}; allowed: (n, {self._width}), all finite")
         if self._memory:
             values = self._memory.add(values)
+        values = values.take(self._columns, axis=1)
         if self.normalisation:
             values = self.normalisation(values)
         answer, self._state = self.network(values, self._state)
@@ -206,7 +227,8 @@ def save_policy(policy: "TrainedPolicy | LearnedMap", folder: str | Path) -> Non
             "normalisation_limit": policy.normalisation.limit if policy.normalisation else None,
             "memory": policy.usual is not None,
             "squashed": policy.squashed,
-        } | ({"asked": list(policy.asked)} if policy.asked else {})
+            "observes": list(policy.observes),
+        }
     buffer = BytesIO()
     np.savez(buffer, **arrays)  # type: ignore[arg-type]
     description |= {
@@ -277,9 +299,14 @@ def _policy(description: dict[str, Any], arrays: dict[str, Array]) -> TrainedPol
         usual=usual,
         squashed=bool(description["squashed"]),
         machine=machine,
-        asked=tuple(str(keyword) for keyword in description.get("asked", ())),
+        observes=tuple(description.get("observes", (*OBSERVATION_NAMES, *_observed_by_keyword(description)))),
         cycles_per_step=cycles,
     )
+
+
+def _observed_by_keyword(description: dict[str, Any]) -> list[str]:
+    """Entries beside the usual ones of a file that does not list what the policy observes, but its keywords."""
+    return [name for name, (keyword, _) in ADDED.items() if keyword in description.get("asked", ())]
 
 
 def _arrays(path: Path, digest: str) -> dict[str, Array]:

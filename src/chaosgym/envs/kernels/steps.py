@@ -4,6 +4,8 @@
 are asked for, and ``which`` (k,) the jobs of the step.
 """
 
+from typing import NamedTuple
+
 import numpy as np
 
 from chaosgym.core.kernel import njit
@@ -27,8 +29,8 @@ TERMS = tuple(f"reward_{term}" for term in ("deviation", "type_iii", "damage", "
 
 MOTOR = ("set_point", "motor_torque", "motor_power")
 
-SO_FAR = tuple(f"job_{name}" for name in ("deviation", "type_iii", "largest_force", "equivalent_force", "life"))
-"""What the job has come to: means, largest force [N], the constant one that wears as much [N], and life [h]."""
+SO_FAR = tuple(f"job_{name}" for name in ("deviation", "type_iii", "largest_force", "equivalent_force", "hours"))
+"""What the job has come to: means, largest force [N], the constant one that wears as much [N], and time [h]."""
 
 REPORT = np.dtype(
     [(name, np.float64) for name in (*TERMS, "speed", "demand", "deviation", "type_iii", "cost", "irregularity")]
@@ -42,8 +44,31 @@ REPORT = np.dtype(
 INFO = (REPORT.names or ())[: -len(MOTOR)]
 """Info of a step at a constant speed."""
 
-LAGS = (1, 2, 4)
-"""Cycles after which measured peaks are compared with themselves."""
+
+class Places(NamedTuple):
+    """Column of each entry that every observation has; entries that a keyword adds follow (``envs.entries``)."""
+
+    speed: int
+    demand: int
+    trim: int
+    offset: int
+    remaining_share: int
+    steps_since_change: int
+    mean_peak_force: int
+    std_peak_force: int
+    max_peak_force: int
+    repeat_1: int
+    repeat_2: int
+    repeat_4: int
+    impacts_per_cycle: int
+    bouncing_share: int
+
+
+PLACE = Places(*range(len(Places._fields)))
+"""Columns of the entries, by name."""
+
+REPEATS = ((PLACE.repeat_1, 1), (PLACE.repeat_2, 2), (PLACE.repeat_4, 4))
+"""Entries that compare measured peaks with those of cycles before, and how many cycles before."""
 
 PERIODS = 8
 """Longest period, in cycles, of a motion that repeats."""
@@ -115,15 +140,15 @@ def rewards_of(task, deviation, type_iii, damage, time, failed, steps_left):
 def sum_up(task, job, force, damage, row):
     """Write ``SO_FAR`` of a ``job`` into its ``row``, by the ``damage`` of its joint; forces are shares of ``force``.
 
-    Life is the time over the damage, infinite without wear; under the equivalent force in every cycle it is the same.
-    That force is not a number where no force wears the joint, with a ``life_share`` of 0.
+    Under the equivalent force in every cycle the damage is the same; it is not a number where no force wears the joint,
+    with a ``reference_damage`` of 0.
     """
-    done, share = job["done"], task["life_share"]
+    done, share = job["done"], task["reference_damage"]
     row["job_deviation"], row["job_type_iii"] = job["off"] / done, job["irregular"] / done
     row["job_largest_force"] = job["largest_force"] * force
     steady = (damage * task["steps"] / done / share) ** (1.0 / LIFE_EXPONENT) if share > 0.0 else np.nan
-    row["job_equivalent_force"] = force * task["load_rating"] * steady
-    row["job_life"] = job["seconds"] / 3600.0 / damage if damage > 0.0 else np.inf
+    row["job_equivalent_force"] = force * task["reference_force"] * steady
+    row["job_hours"] = job["seconds"] / 3600.0
 
 
 @njit(cache=True, nogil=True)
@@ -220,11 +245,11 @@ def recurrence_misses(peaks, misses):
 def observe(
     tasks, which, demands, jobs, true_peaks, bounce_duration, period, errors, counted, low, high, measured, values
 ):
-    """Write the observations of the last cycles: ``values`` (k, 14 or more), ``measured`` peaks (k, last).
+    """Write the observations of the last cycles: ``values`` (k, ``len(PLACE)`` or more), ``measured`` peaks (k, last).
 
     ``true_peaks`` (k, cycles) where the sensor is, ``bounce_duration`` (k, cycles, sides), ``period`` and ``counted``
     impacts (k,). ``errors`` (k, last + 1) from 0 to 1, of these peaks and of the share of bouncing. ``values`` lie
-    between ``low`` and ``high``; their first 14 columns are ``observation.OBSERVATION_NAMES``.
+    between ``low`` and ``high``; columns that are not in ``PLACE`` stay as they are.
     """
     task, last, sides = tasks[0], measured.shape[1], bounce_duration.shape[2]
     first = true_peaks.shape[1] - last
@@ -242,17 +267,19 @@ def observe(
         for n in range(last):
             squares += (peaks[n] - mean) ** 2
         demand = demands[i, job["done"]]
-        seen[0], seen[1], seen[2], seen[3] = job["speed"], demand, job["trim"], job["speed"] - demand
-        seen[4] = 1.0 - job["done"] / task["steps"]
-        seen[5] = min(job["done"] - job["changed"], task["shortest_hold"])
-        seen[6], seen[7], seen[8] = mean, np.sqrt(squares / last), largest
-        for column, lag in enumerate(LAGS):
+        seen[PLACE.speed], seen[PLACE.demand] = job["speed"], demand
+        seen[PLACE.trim], seen[PLACE.offset] = job["trim"], job["speed"] - demand
+        seen[PLACE.remaining_share] = 1.0 - job["done"] / task["steps"]
+        seen[PLACE.steps_since_change] = min(job["done"] - job["changed"], task["shortest_hold"])
+        seen[PLACE.mean_peak_force], seen[PLACE.max_peak_force] = mean, largest
+        seen[PLACE.std_peak_force] = np.sqrt(squares / last)
+        for column, lag in REPEATS:
             missed = 0.0
             for n in range(lag, last):
                 missed += abs(peaks[n] - peaks[n - lag])
-            seen[9 + column] = missed / max(1, last - lag)
-        seen[12] = counted[k] / last
+            seen[column] = missed / max(1, last - lag)
+        seen[PLACE.impacts_per_cycle] = counted[k] / last
         error = (2.0 * errors[k, last] - 1.0) * task["bouncing_error"]
-        seen[13] = 2.0 * bouncing / (last * sides * period[k]) + error
-        for column in range(14):
+        seen[PLACE.bouncing_share] = 2.0 * bouncing / (last * sides * period[k]) + error
+        for column in range(len(PLACE)):
             seen[column] = limited(seen[column], low[column], high[column])

@@ -5,11 +5,7 @@ nor on the clearance; they are kept for machines that differ only in these.
 """
 
 import math
-from collections.abc import Callable
-from dataclasses import fields
-from functools import cache, lru_cache
-from operator import attrgetter
-from typing import TYPE_CHECKING, Any, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 
@@ -18,15 +14,8 @@ from chaosgym.core.binned.model import FORCING_TERMS
 from chaosgym.errors import ParameterError
 from chaosgym.machines.parameters import refuse_not_finite
 
-if TYPE_CHECKING:
-    from chaosgym.machines.binned.machine import BinnedMachine
-
-
 STEP_PHASE = 0.5
 """Angle [rad] by which the fastest motion turns in half an interval of a look, by default."""
-
-KEPT = 128
-"""Machines whose assembled equations are kept, whatever their speed and clearance."""
 
 MOST_STEPS = 1e9
 """Steps of a bin; a cycle's budget ends by default long before."""
@@ -160,31 +149,3 @@ def whole_steps(wanted: float) -> int:
             "inertia, less stiffness and damping, or a higher speed"
         )
     return max(1, math.ceil(wanted))
-
-
-def structure_of(machine: "BinnedMachine") -> tuple[Any, ...]:
-    """Class and all fields that shape the matrices."""
-    kind: Any = type(machine)
-    return (kind, *_structure_values(kind)(machine))
-
-
-@cache
-def _structure_values(kind: Any) -> Callable[[Any], tuple[Any, ...]]:
-    return attrgetter(*_structure_fields(kind))
-
-
-@cache
-def _structure_fields(kind: Any) -> tuple[str, ...]:
-    return tuple(field.name for field in fields(kind) if field.name not in kind.beside_matrices)
-
-
-def machine_of(kind: type, structure: tuple[Any, ...]) -> "BinnedMachine":
-    """Machine at the default speed and clearance."""
-    machine: BinnedMachine = kind(**dict(zip(_structure_fields(kind), structure, strict=True)))
-    return machine
-
-
-@lru_cache(maxsize=KEPT)
-def kept_held(kind: type, *structure: Any) -> Held:
-    """What is held, kept for machines without a table of propagators."""
-    return machine_of(kind, structure).held()

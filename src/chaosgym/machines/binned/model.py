@@ -9,7 +9,7 @@ from collections import OrderedDict
 from collections.abc import Callable, Hashable, Sequence
 from functools import lru_cache
 from threading import Lock
-from typing import TYPE_CHECKING, Any, NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -17,19 +17,14 @@ from numpy.typing import NDArray
 from chaosgym.arrays import Array
 from chaosgym.core.binned.model import BinnedModel
 from chaosgym.machines.binned.equations import (
-    KEPT,
     STEP_PHASE,
     Contact,
     even_powers,
     largest_rate,
-    machine_of,
-    structure_of,
     whole_steps,
 )
-
-if TYPE_CHECKING:
-    from chaosgym.machines.binned.machine import BinnedMachine
-
+from chaosgym.machines.binned.held_machine import HeldMachine
+from chaosgym.machines.binned.structure import KEPT, machine_of, structure_of
 
 MAX_SETS = 32
 """Contact sets for which propagators are made; a machine with more is left to Taylor series."""
@@ -87,12 +82,12 @@ def _models_by_speed(step_phase: float, *structure: Any) -> ModelsBySpeed:
     return ModelsBySpeed(step_phase, structure)
 
 
-def models_by_speed(machine: "BinnedMachine", step_phase: float = STEP_PHASE) -> ModelsBySpeed:
+def models_by_speed(machine: HeldMachine, step_phase: float = STEP_PHASE) -> ModelsBySpeed:
     """Models of a machine that ``has_propagators``; ``step_phase`` is that of ``BinnedMachine.reduce``."""
     return _models_by_speed(step_phase, *structure_of(machine))
 
 
-def exact_model(machine: "BinnedMachine", step_phase: float) -> BinnedModel:
+def exact_model(machine: HeldMachine, step_phase: float) -> BinnedModel:
     """Model of a machine that ``has_propagators``; ``step_phase`` is that of ``BinnedMachine.reduce``."""
     return models_by_speed(machine, step_phase).at(machine.drive_speed)._replace(gap=machine.gaps)
 

@@ -1,6 +1,6 @@
 """Runs of mechanisms, single or in batches: which kernel moves them, and what it records besides."""
 
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
@@ -16,20 +16,17 @@ from chaosgym.core.cycle import CycleArrays
 from chaosgym.core.tangent import Tangents, no_tangents
 from chaosgym.machines.batch import CompiledBatch, Cycles, KickedBatch, put, stacked
 from chaosgym.machines.binned.equations import STEP_PHASE
+from chaosgym.machines.binned.held_machine import HeldMachine
 from chaosgym.machines.binned.model import ModelsBySpeed, models_by_speed
 from chaosgym.machines.binned.stepped import fastest_rate, stepped_model
 from chaosgym.machines.integrators import ExactEvents, Integrator
-
-if TYPE_CHECKING:
-    from chaosgym.machines.binned.machine import BinnedMachine
-
 
 STEPS_AT_ONCE = 200_000
 """Steps without events in one call of a kernel: some tenths of a second of processor time."""
 
 
 def run(
-    machine: "BinnedMachine",
+    machine: HeldMachine,
     coordinates: Array,
     bouncing: Array,
     arrays: CycleArrays,

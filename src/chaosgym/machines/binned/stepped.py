@@ -2,17 +2,14 @@
 
 import math
 from functools import lru_cache
-from typing import TYPE_CHECKING
 
 import numpy as np
 
 from chaosgym.arrays import Array
 from chaosgym.core.binned.model import FORCING_TERMS, TaylorModel
-from chaosgym.machines.binned.equations import even_powers, kept_held, largest_rate, structure_of, whole_steps
-
-if TYPE_CHECKING:
-    from chaosgym.machines.binned.machine import BinnedMachine
-
+from chaosgym.machines.binned.equations import even_powers, largest_rate, whole_steps
+from chaosgym.machines.binned.held_machine import HeldMachine
+from chaosgym.machines.binned.structure import kept_held, structure_of
 
 PIECE_PHASE = 2.0
 """Longest piece of a Taylor series times largest eigenvalue without contact."""
@@ -31,7 +28,7 @@ KEPT_STEPPED = 16
 
 
 @lru_cache(maxsize=KEPT_STEPPED)
-def stepped_model(machine: "BinnedMachine", step_phase: float) -> TaylorModel:
+def stepped_model(machine: HeldMachine, step_phase: float) -> TaylorModel:
     """Model of any machine for Taylor series; kept for the last machines, which a search asks for again and again.
 
     A closed contact turns by ``step_phase`` / 4 in a piece of a series; half of it leaves a sixteenth of the error.
@@ -90,7 +87,7 @@ def _with_readings(accelerations: Array, row: Array) -> Array:
     return lanes
 
 
-def fastest_rate(machine: "BinnedMachine", model: TaylorModel) -> float:
+def fastest_rate(machine: HeldMachine, model: TaylorModel) -> float:
     """Largest modulus [1/s] of an eigenvalue with every contact closed."""
     rows, n = model.row.shape
     some = model.acceleration[machine.sampled_bins, :, rows : rows + n]

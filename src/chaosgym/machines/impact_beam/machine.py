@@ -4,20 +4,19 @@ import math
 from collections.abc import Mapping
 from dataclasses import dataclass
 from functools import lru_cache
-from typing import TYPE_CHECKING, Any, ClassVar
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from chaosgym.arrays import Array
 from chaosgym.core.modal_model import ModalImpactModel
+from chaosgym.machines.flexible_model import flexible_model
 from chaosgym.machines.impact_beam.modes import modal_analysis, modal_curvatures, static_tip_deflection
 from chaosgym.machines.impact_beam.parameters import BeamParameters
 from chaosgym.machines.integrators import TIGHTEST_EVENTS, ExactEvents
-from chaosgym.machines.modal_impact import flexible_model
 
 if TYPE_CHECKING:
-    from chaosgym.machines.batch import CompiledBatch
     from chaosgym.machines.picture import Sketch
 
 
@@ -36,8 +35,6 @@ class ImpactBeam(BeamParameters):
     >>> beam.cycle_period
     0.05
     """
-
-    runs_in_exudyn: ClassVar[bool] = True
 
     @property
     def n_states(self) -> int:
@@ -75,12 +72,6 @@ class ImpactBeam(BeamParameters):
     def stress_at(self, position: float) -> Array:
         """Bending stress (n,) for each mode at a position [m] from the pivot on; see ``Machine.stress_at``."""
         return -0.5 * self.height * self.youngs_modulus * modal_curvatures(self, position)
-
-    def exudyn_batch(self, count: int) -> "CompiledBatch":
-        """Return ``count`` variants that move in Exudyn; see ``Machine.exudyn_batch``."""
-        from chaosgym.machines.impact_beam.exudyn_beam import ExudynBatch
-
-        return ExudynBatch(self, count)
 
     @property
     def structure(self) -> ModalImpactModel:

@@ -8,8 +8,8 @@ import numpy as np
 from chaosgym.arrays import Array
 from chaosgym.errors import ParameterError
 from chaosgym.machines.beam_element import bending_matrices, fitted_modes, graded_mesh
+from chaosgym.machines.flexible_model import Modes
 from chaosgym.machines.impact_beam.parameters import BeamParameters
-from chaosgym.machines.modal_impact import Modes
 
 MIN_ELEMENTS = 24
 """Elements of the finest default mesh; more modes take three elements a mode."""

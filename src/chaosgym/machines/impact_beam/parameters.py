@@ -62,28 +62,6 @@ class BeamParameters(ModalImpactMachine):
         "--clearance-mm": Number("clearance", "mm", 1e-3),
     }
     scenes: ClassVar[Mapping[str, Mapping[str, Any]]] = {"as in the thesis": {}}
-    extremes: ClassVar[Mapping[str, Mapping[str, Any]]] = {
-        "clearance 0": {"clearance": 0.0},
-        "clearance 1e-9 m": {"clearance": 1e-9},
-        "clearance 1 m": {"clearance": 1.0},
-        "0.01 Hz": {"excitation_frequency": 0.01},
-        "1000 Hz": {"excitation_frequency": 1000.0},
-        "contact stiffness 1e3 N/m": {"contact_stiffness": 1e3},
-        "contact stiffness 1e9 N/m": {"contact_stiffness": 1e9},
-        "contact stiffness 1e12 N/m": {"contact_stiffness": 1e12},
-        "contact damping 0": {"contact_damping": 0.0},
-        "contact damping 1e4 N s/m": {"contact_damping": 1e4},
-        "contact damping 1e6 N s/m": {"contact_damping": 1e6},
-        "damping ratio 0": {"damping_ratio": 0.0},
-        "damping ratio 1": {"damping_ratio": 1.0},
-        "damping ratio 100": {"damping_ratio": 100.0},
-        "shaker damping 0": {"shaker_damping": 0.0},
-        "shaker damping 1e3 N s/m": {"shaker_damping": 1e3},
-        "shaker damping 1e6 N s/m": {"shaker_damping": 1e6},
-        "no damping at all": {"damping_ratio": 0.0, "shaker_damping": 0.0, "contact_damping": 0.0},
-        "force 0": {"force_amplitude": 0.0},
-        "force 1e6 N": {"force_amplitude": 1e6},
-    }
 
     task_defaults: ClassVar[TaskDefaults] = TASK_DEFAULTS
 

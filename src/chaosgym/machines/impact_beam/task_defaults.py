@@ -38,6 +38,6 @@ TASK_DEFAULTS = TaskDefaults(
         "start_below": 2.0,
         "deviation_weight": 0.25,
         "speed_ripple": 0.002,
-        "load_rating": 95.0,
+        "reference_force": 95.0,
     },
 )

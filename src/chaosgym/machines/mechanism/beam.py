@@ -17,7 +17,7 @@ import numpy as np
 
 from chaosgym.arrays import Array
 from chaosgym.machines.beam_element import POINTS, bending_matrices, fitted_modes, interpolation
-from chaosgym.machines.mechanism.links import Body, Link, Places, together
+from chaosgym.machines.mechanism.links import Beam, Body, Link, Places, together
 
 ELEMENTS = 10
 """Finite elements, at least; more modes take two a mode."""
@@ -26,41 +26,6 @@ START, END = "start", "end"
 """Points of a beam."""
 
 STRETCH = "stretch"
-
-
-class Beam(NamedTuple):
-    """A uniform beam.
-
-    Attributes
-    ----------
-    length
-        From start to end [m].
-    area, second_moment
-        Of the cross section [m^2], [m^4].
-    youngs_modulus, density
-        [Pa], [kg/m^3].
-    modes
-        Bending modes that are kept.
-    damping_ratio
-        Of every mode, and of the stretch.
-    stretches
-        Whether its length changes.
-    fitted
-        Modes that stand for all others, as inertia that the beam's end feels.
-    sideways_moment
-        Second moment [m^4] of the cross section for bending out of the plane of x and y, in space.
-    """
-
-    length: float
-    area: float
-    second_moment: float
-    youngs_modulus: float
-    density: float
-    modes: int
-    damping_ratio: float = 0.0
-    stretches: bool = True
-    fitted: int = 0
-    sideways_moment: float = 0.0
 
 
 class Bending(NamedTuple):

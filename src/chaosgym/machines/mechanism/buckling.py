@@ -10,9 +10,8 @@ import math
 import numpy as np
 
 from chaosgym.arrays import Array
-from chaosgym.machines.mechanism.beam import Beam
 from chaosgym.machines.mechanism.equations import assembled
-from chaosgym.machines.mechanism.links import Link
+from chaosgym.machines.mechanism.links import Beam, Link
 from chaosgym.machines.mechanism.mechanism import Mechanism
 from chaosgym.machines.mechanism.nominal import Revolution
 

@@ -1,21 +1,17 @@
 """The contacts of a mechanism: the surfaces of each joint with clearance, as rows of its coordinates."""
 
-from typing import TYPE_CHECKING
-
 import numpy as np
 
 from chaosgym.machines.binned.equations import Contact
 from chaosgym.machines.mechanism.clearance import ROUND, surface_fields
 from chaosgym.machines.mechanism.joints import ACROSS, PITCH, PLACES, SIDEWAYS, TURN, YAW
-
-if TYPE_CHECKING:
-    from chaosgym.machines.mechanism.machine import MechanismMachine
+from chaosgym.machines.mechanism.opened import OpenedMechanism
 
 GUIDED = {ACROSS: {TURN: 1.0, PITCH: 1.0}, SIDEWAYS: {YAW: -1.0}}
 """Turns in a guide, in the plane or in space, that move its stations in either direction per metre of their place."""
 
 
-def contacts_of(machine: "MechanismMachine") -> list[Contact]:
+def contacts_of(machine: OpenedMechanism) -> list[Contact]:
     """Contacts of all joints with clearance, in their order."""
     found = []
     for joint in machine.mechanism.joints:

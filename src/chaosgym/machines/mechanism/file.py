@@ -35,7 +35,7 @@ from chaosgym.machines.mechanism.mechanism import Mechanism
 from chaosgym.machines.mechanism.nominal import places, revolution_of
 from chaosgym.machines.mechanism.spatial import SpatialMechanism
 from chaosgym.machines.parameters import parameter
-from chaosgym.machines.stated import range_of, reduced, state_of, tolerances_of
+from chaosgym.machines.stated import range_of, state_of, tolerances_of
 from chaosgym.numbers import number
 
 STILL = 1e-6
@@ -272,7 +272,7 @@ def built(path: str, digest: str, data: Mapping[str, Any], _folder: Path) -> typ
         monitored=operation.get("monitored", ""),
         motor=motor,
         about={"provenance": "stated", "source": path},
-        namespace={"name": path, "__doc__": data[""].get("title", path), "__reduce__": reduced},
+        namespace={"name": path, "__doc__": data[""].get("title", path)},
         definition=parameter(digest, choices=(digest,), provenance="stated", source=path),
         speed=speed,
     )

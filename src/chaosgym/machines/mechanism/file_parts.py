@@ -8,9 +8,9 @@ import numpy as np
 
 from chaosgym.errors import ParameterError
 from chaosgym.machines.file_keys import needed
-from chaosgym.machines.mechanism.beam import END, START, Beam
+from chaosgym.machines.mechanism.beam import END, START
 from chaosgym.machines.mechanism.joints import GROUND, KINDS, SPATIAL_KINDS, Joint
-from chaosgym.machines.mechanism.links import Body, Link
+from chaosgym.machines.mechanism.links import Beam, Body, Link
 from chaosgym.machines.mechanism.space import SpatialBody, spatial_link
 from chaosgym.machines.mechanism.spatial_beam import spatial_beam_link
 from chaosgym.numbers import number

@@ -1,16 +1,13 @@
 """Friction of one joint of a mechanism: what it drives in the equations, and what it takes from the drive."""
 
 import math
-from typing import TYPE_CHECKING
 
 import numpy as np
 
 from chaosgym.arrays import Array
 from chaosgym.errors import ParameterError
 from chaosgym.machines.mechanism.equations import assembled
-
-if TYPE_CHECKING:
-    from chaosgym.machines.mechanism.machine import MechanismMachine
+from chaosgym.machines.mechanism.opened import OpenedMechanism
 
 RAMP = 0.02
 """Sliding speed below which friction fades, as a share of the largest in a revolution."""
@@ -19,7 +16,7 @@ FRICTION_ROUNDS = 1000
 """Most rounds in which friction and the force that presses find each other."""
 
 
-def rubbing(machine: "MechanismMachine", theta: Array) -> tuple[Array, Array, Array]:
+def rubbing(machine: OpenedMechanism, theta: Array) -> tuple[Array, Array, Array]:
     """Sliding per radian (B,) of the joint with friction, its sign (B,), and what a newton drives (B, n).
 
     The sign fades where the sliding halts.
@@ -30,7 +27,7 @@ def rubbing(machine: "MechanismMachine", theta: Array) -> tuple[Array, Array, Ar
     return lever * rate, signed, lever * machine.rub * signed[:, None] * row
 
 
-def friction_torque(machine: "MechanismMachine", angles: Array) -> Array:
+def friction_torque(machine: OpenedMechanism, angles: Array) -> Array:
     """Torque (B,) that friction takes while the joint's surfaces carry what holds its gap in the middle."""
     if not machine.rub:
         return np.zeros(len(angles))

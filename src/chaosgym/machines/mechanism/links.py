@@ -9,15 +9,11 @@ with its place rho, shape N and curve C in the axes of the link. In the nominal 
 """
 
 from collections.abc import Mapping
-from typing import TYPE_CHECKING, Any, NamedTuple, Optional
+from typing import Any, NamedTuple
 
 import numpy as np
 
 from chaosgym.arrays import Array
-
-if TYPE_CHECKING:
-    from chaosgym.machines.mechanism.beam import Beam
-
 
 RIGID = 3
 """Coordinates of a rigid link: two places and a turn."""
@@ -104,6 +100,41 @@ class Body(NamedTuple):
     centre: tuple[float, float] = (0.0, 0.0)
 
 
+class Beam(NamedTuple):
+    """A uniform beam.
+
+    Attributes
+    ----------
+    length
+        From start to end [m].
+    area, second_moment
+        Of the cross section [m^2], [m^4].
+    youngs_modulus, density
+        [Pa], [kg/m^3].
+    modes
+        Bending modes that are kept.
+    damping_ratio
+        Of every mode, and of the stretch.
+    stretches
+        Whether its length changes.
+    fitted
+        Modes that stand for all others, as inertia that the beam's end feels.
+    sideways_moment
+        Second moment [m^4] of the cross section for bending out of the plane of x and y, in space.
+    """
+
+    length: float
+    area: float
+    second_moment: float
+    youngs_modulus: float
+    density: float
+    modes: int
+    damping_ratio: float = 0.0
+    stretches: bool = True
+    fitted: int = 0
+    sideways_moment: float = 0.0
+
+
 class Link(NamedTuple):
     """A link of a mechanism.
 
@@ -140,7 +171,7 @@ class Link(NamedTuple):
     elastic: tuple[str, ...] = ()
     stiffness: Array = np.zeros((0, 0))
     damping: Array = np.zeros((0, 0))
-    beam: Optional["Beam"] = None
+    beam: Beam | None = None
     rigid: int = RIGID
     turning: Array = np.zeros((3, 0, 0))
 

@@ -2,22 +2,19 @@
 
 import math
 from functools import lru_cache
-from typing import TYPE_CHECKING
 
 import numpy as np
 
 from chaosgym.machines.mechanism.buckling import buckling
 from chaosgym.machines.mechanism.mechanism import Mechanism
 from chaosgym.machines.mechanism.motor import MOTOR_FIELDS
-
-if TYPE_CHECKING:
-    from chaosgym.machines.mechanism.machine import MechanismMachine
+from chaosgym.machines.mechanism.opened import OpenedMechanism
 
 SMALL = 0.02
 """Clearance as a share of a link's length beyond which motions in the gap are not small."""
 
 
-def instabilities_of(machine: "MechanismMachine") -> tuple[str, ...]:
+def instabilities_of(machine: OpenedMechanism) -> tuple[str, ...]:
     """Links that buckle, and links in space that bend undamped."""
     told = [*buckling(machine.scaled(), machine.revolution, machine.crank_rate)]
     undamped = [link.name for link in machine.mechanism.links if link.beam and not link.beam.damping_ratio]
@@ -29,7 +26,7 @@ def instabilities_of(machine: "MechanismMachine") -> tuple[str, ...]:
     return tuple(told)
 
 
-def notes_of(machine: "MechanismMachine") -> tuple[str, ...]:
+def notes_of(machine: OpenedMechanism) -> tuple[str, ...]:
     """Gaps that are not small, pins larger than links, motion that may grow, and limits of a motor."""
     told = []
     if machine.has_motor and machine.rub:

@@ -1,18 +1,15 @@
 """Pictures of a mechanism: its links at a moment, and at eight crank angles, with gaps drawn larger than they are."""
 
 import math
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from chaosgym.arrays import Array
 from chaosgym.machines.mechanism.joints import GROUND
+from chaosgym.machines.mechanism.opened import OpenedMechanism
 from chaosgym.machines.picture import PALE, WILD, Shape, Sketch, Words, draw_shapes, frame, moving, samples_of
-
-if TYPE_CHECKING:
-    from chaosgym.machines.mechanism.machine import MechanismMachine
-
 
 GAP, ROOM = 0.04, 0.14
 """Gap as drawn and space around the mechanism, as shares of its size."""
@@ -23,7 +20,7 @@ AROUND, GHOSTS = 72, 12
 CIRCLE = np.stack([np.cos(turn := np.linspace(0.0, 2.0 * math.pi, 60)), np.sin(turn)], axis=1)
 
 
-def link_lines(machine: "MechanismMachine", z: Array) -> dict[str, Array]:
+def link_lines(machine: OpenedMechanism, z: Array) -> dict[str, Array]:
     """Places (B, k, 2) [m] of the points of each link, of coordinates z (B, z), joined to one line through them.
 
     A mechanism in space is drawn as seen along z.
@@ -35,12 +32,12 @@ def link_lines(machine: "MechanismMachine", z: Array) -> dict[str, Array]:
     return lines
 
 
-def _joint_places(machine: "MechanismMachine", z: Array) -> list[tuple[Any, Array]]:
+def _joint_places(machine: OpenedMechanism, z: Array) -> list[tuple[Any, Array]]:
     """Each joint and where its second point is, (B, 2)."""
     return [(joint, machine.mechanism.point(z, joint.second)[0][:, :2]) for joint in machine.mechanism.joints]
 
 
-def _limits(machine: "MechanismMachine", around: Array) -> tuple[Array, Array, float]:
+def _limits(machine: OpenedMechanism, around: Array) -> tuple[Array, Array, float]:
     """Corners (2,) around all points through a revolution, with some space, and the size of it all [m]."""
     lines = [line.reshape(-1, 2) for line in link_lines(machine, around).values()]
     ground = np.array(list(machine.mechanism.ground.values()), dtype=float)
@@ -55,7 +52,7 @@ def _turn(count: int) -> Array:
     return np.arange(count, dtype=np.float64) * (2.0 * math.pi / count)
 
 
-def _guides(machine: "MechanismMachine", around: Array, size: float) -> list[Shape]:
+def _guides(machine: OpenedMechanism, around: Array, size: float) -> list[Shape]:
     """The guide of each prismatic joint on the ground: two lines, apart by the gap as it is drawn."""
     lines = []
     for joint, places in _joint_places(machine, around):
@@ -75,7 +72,7 @@ def _guides(machine: "MechanismMachine", around: Array, size: float) -> list[Sha
     return lines
 
 
-def _links(machine: "MechanismMachine", z: Array) -> list[Shape]:
+def _links(machine: OpenedMechanism, z: Array) -> list[Shape]:
     """Each link as a line through its points, which are dots; the crank is the thickest."""
     shapes = []
     for name, line in link_lines(machine, z).items():
@@ -116,7 +113,7 @@ def sketch_of_mechanism(record: Any, rows: NDArray[np.int64], force_limit: float
     )
 
 
-def draw_poses(panels: Any, machine: "MechanismMachine") -> None:
+def draw_poses(panels: Any, machine: OpenedMechanism) -> None:
     """Draw the links at equal steps of the crank angle, one in each of the panels; rings and guides show the gaps."""
     theta, around = _turn(len(panels)), machine.nominal_places(_turn(AROUND))
     low, high, size = _limits(machine, around)

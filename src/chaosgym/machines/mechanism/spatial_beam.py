@@ -24,14 +24,13 @@ from chaosgym.machines.mechanism.beam import (
     END,
     START,
     STRETCH,
-    Beam,
     Bending,
     bending_of,
     curvatures,
     elastic_of,
     pull_of,
 )
-from chaosgym.machines.mechanism.links import Link
+from chaosgym.machines.mechanism.links import Beam, Link
 from chaosgym.machines.mechanism.space import (
     RIGID,
     Lie,

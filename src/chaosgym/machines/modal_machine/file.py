@@ -22,7 +22,7 @@ from chaosgym.machines.modal_machine.structure import BASE, Structure
 from chaosgym.machines.modal_machine.turning import turning_joints
 from chaosgym.machines.modal_machine.varying import Spring, VaryingMachine, checked_samples
 from chaosgym.machines.parameters import described_as, parameter, parameters_of
-from chaosgym.machines.stated import class_with, range_of, reduced, state_of, tolerances_of
+from chaosgym.machines.stated import class_with, range_of, state_of, tolerances_of
 from chaosgym.units import TURNING
 
 SAMPLED = ("drive", "joint", "spring")
@@ -104,7 +104,7 @@ def built(path: str, digest: str, data: Mapping[str, Any], folder: Path) -> type
     usual = {name: range_of(ModalMachine, f"operation.{name}_range", name, given) for name, given in named}
     definition = parameter(digest, choices=(digest,), provenance="stated", source=path)
     drives, title = tuple(_drive(row) for row in data["drive"]), data[""].get("title", path)
-    types: dict[str, Any] = {"name": path, "__doc__": title, "__reduce__": reduced}
+    types: dict[str, Any] = {"name": path, "__doc__": title}
     made: Any
     if len(data["joint"]) > 1 or "tangent" in data["joint"][0]:
         _refuse_varying(data)

@@ -13,11 +13,11 @@ from chaosgym.core.cycle import CycleArrays, cycle_arrays
 from chaosgym.core.tangent import Tangents, no_tangents
 from chaosgym.errors import ParameterError
 from chaosgym.machines.abilities import Flexible
+from chaosgym.machines.flexible_model import Modes, with_rigid_bodies
 from chaosgym.machines.integrators import ExactEvents, Integrator
 from chaosgym.machines.joint_sets import PressedSets, Sliders
 from chaosgym.machines.joint_tables import JointTables
 from chaosgym.machines.machine import Machine, Number, Option
-from chaosgym.machines.modal_impact import Modes, with_rigid_bodies
 from chaosgym.machines.modal_machine.drive import Drive, checked, drive_notes, modal_drive
 from chaosgym.machines.modal_machine.friction import OF_FRICTION
 from chaosgym.machines.modal_machine.machine import as_there, rigid_note, turning_note
@@ -275,17 +275,6 @@ class JointedMachine(Machine):
             return np.asarray(peak_force.max(axis=-1))
         first = 2 * self.joints.index(self.monitored)
         return np.asarray(peak_force[..., first : first + 2].max(axis=-1))
-
-    def share_of_bound(self, states: Array, peak_force: Array) -> float:
-        """Share of the bound of passivity; see ``Flexible.passive_share``.
-
-        Surfaces that move may give any power: then nothing bounds a run, and the share is 0.
-        """
-        sets = self.sets
-        if sets.sliders.speed.any():
-            return 0.0
-        surfaces = sets.springs, sets.dampers, self.stops
-        return self.without_friction.passive_share(*surfaces, self.cycle_period, states, peak_force)
 
 
 @lru_cache(maxsize=64)

@@ -16,9 +16,10 @@ from chaosgym.arrays import Array
 from chaosgym.core.joints.tables import SLOW
 from chaosgym.core.modal_model import ModalImpactModel
 from chaosgym.errors import ParameterError
+from chaosgym.machines.flexible_model import Modes, Stop, flexible_model
 from chaosgym.machines.machine import Number, Option
 from chaosgym.machines.modal_blocks import RIGID_SHARE, nearly_rigid
-from chaosgym.machines.modal_impact import ModalImpactMachine, Modes, Stop, flexible_model
+from chaosgym.machines.modal_impact import ModalImpactMachine
 from chaosgym.machines.modal_machine.drive import Drive, checked, drive_notes, modal_drive
 from chaosgym.machines.modal_machine.structure import Structure
 from chaosgym.machines.parameters import assumed, described_as, parameter, parameters_of
@@ -82,14 +83,6 @@ class ModalMachine(ModalImpactMachine):
     options: ClassVar[Mapping[str, Option]] = {
         "--speed-hz": Number("speed", "Hz"),
         "--clearance-mm": Number("clearance", "mm", 1e-3),
-    }
-    extremes: ClassVar[Mapping[str, Mapping[str, Any]]] = {
-        "clearance 0": {"clearance": 0.0},
-        "clearance 1 m": {"clearance": 1.0},
-        "no damping at all": {"damping_factor": 0.0, "contact_damping": 0.0},
-        "100 times the damping": {"damping_factor": 100.0},
-        "no drive": {"drive_level": 0.0},
-        "1000 times the drive": {"drive_level": 1e3},
     }
 
     turning: ClassVar[tuple[str, ...]] = ()

@@ -25,8 +25,8 @@ from chaosgym.errors import ParameterError
 from chaosgym.machines.binned.equations import Contact, Held, held, middles_and_nodes
 from chaosgym.machines.binned.machine import BinnedMachine
 from chaosgym.machines.binned.model import KEPT_BYTES
+from chaosgym.machines.flexible_model import Modes, with_rigid_bodies
 from chaosgym.machines.machine import Option, TaskDefaults
-from chaosgym.machines.modal_impact import Modes, with_rigid_bodies
 from chaosgym.machines.modal_machine.drive import Drive, checked, drive_notes, modal_drive
 from chaosgym.machines.modal_machine.machine import ModalMachine, as_there, rigid_note, turning_note
 from chaosgym.machines.modal_machine.structure import Structure
@@ -137,7 +137,6 @@ class VaryingMachine(BinnedMachine):
     aliases: ClassVar[Mapping[str, str]] = ModalMachine.aliases
     usual_ranges: ClassVar[Mapping[str, tuple[float, float]]] = ModalMachine.usual_ranges
     options: ClassVar[Mapping[str, Option]] = ModalMachine.options
-    extremes: ClassVar[Mapping[str, Mapping[str, Any]]] = ModalMachine.extremes
     fidelity_ladder: ClassVar[Mapping[str, Mapping[str, Any]]] = {
         rung: {"matrix_update_interval": interval}
         for rung, interval in (("draft", 4.0), ("standard", 1.0), ("fine", 0.5), ("reference", 0.25))
@@ -345,7 +344,3 @@ class VaryingMachine(BinnedMachine):
         hertz = self.frequency_factor * self.modes.angular_frequency / (2.0 * math.pi)
         notes = turning_note(self.turning), rigid_note(hertz), rubs, *drive_notes(self.drives)
         return tuple(filter(None, notes))
-
-    def share_of_bound(self, states: Array, peak_force: Array) -> float:
-        """Return 0: sliding surfaces and varying stiffness may give any power, so that nothing bounds a run."""
-        return 0.0

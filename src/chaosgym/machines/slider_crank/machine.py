@@ -22,7 +22,7 @@ from chaosgym.machines.slider_crank.coordinates import SLIDER_ACROSS, SLIDER_LAT
 from chaosgym.machines.slider_crank.equations import equations
 from chaosgym.machines.slider_crank.joints import display_of, gaps_of, joints_of, sensor_peaks, sensors_of
 from chaosgym.machines.slider_crank.mechanism import pin_and_pivot
-from chaosgym.machines.slider_crank.model import force_bound, held_of
+from chaosgym.machines.slider_crank.model import held_of
 from chaosgym.machines.slider_crank.parameters import FITTED, CrankParameters
 
 if TYPE_CHECKING:
@@ -196,10 +196,6 @@ class SliderCrank(CrankParameters):
         from chaosgym.machines.slider_crank.picture import sketch_of_crank
 
         return sketch_of_crank(record, rows, force_limit)
-
-    def share_of_bound(self, states: Array, peak_force: Array) -> float:
-        """Largest force, as a share of that of an impact of all masses at ten times the speed of the crank pin."""
-        return float(peak_force.max()) / force_bound(self)
 
 
 THESIS_SLIDER_CRANK = SliderCrank(fitted_modes=0, matrix_update_interval=5.0)

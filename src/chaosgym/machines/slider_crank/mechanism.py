@@ -26,10 +26,10 @@ from functools import lru_cache
 import numpy as np
 
 from chaosgym.arrays import Array
-from chaosgym.machines.mechanism.beam import END, START, Beam, beam_link
+from chaosgym.machines.mechanism.beam import END, START, beam_link
 from chaosgym.machines.mechanism.equations import smooth
 from chaosgym.machines.mechanism.joints import ACROSS, ALONG, GROUND, PITCH, ROLL, SIDEWAYS, TURN, YAW, Joint
-from chaosgym.machines.mechanism.links import Body, Link, rigid_link
+from chaosgym.machines.mechanism.links import Beam, Body, Link, rigid_link
 from chaosgym.machines.mechanism.mechanism import Mechanism
 from chaosgym.machines.mechanism.nominal import Revolution, places, refined, revolution_of
 from chaosgym.machines.mechanism.space import SpatialBody, spatial_link

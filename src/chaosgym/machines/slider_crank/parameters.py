@@ -24,7 +24,7 @@ from chaosgym.errors import ParameterError
 from chaosgym.machines.binned.machine import BinnedMachine
 from chaosgym.machines.machine import Option, TaskDefaults
 from chaosgym.machines.parameters import parameter
-from chaosgym.machines.slider_crank.scenes import EXTREMES, OPTIONS, SCENES
+from chaosgym.machines.slider_crank.scenes import OPTIONS, SCENES
 from chaosgym.machines.slider_crank.task_defaults import TASK_DEFAULTS
 
 FITTED = "docs/development/calibration.md"
@@ -63,7 +63,6 @@ class CrankParameters(BinnedMachine):
     }
     options: ClassVar[Mapping[str, Option]] = OPTIONS
     scenes: ClassVar[Mapping[str, Mapping[str, Any]]] = SCENES
-    extremes: ClassVar[Mapping[str, Mapping[str, Any]]] = EXTREMES
     task_defaults: ClassVar[TaskDefaults] = TASK_DEFAULTS
     beside_matrices: ClassVar[tuple[str, ...]] = ("crank_speed", "slider_clearance", "ball_clearance")
     sides: ClassVar[tuple[str, ...]] = ("upper", "lower")

@@ -26,6 +26,6 @@ TASK_DEFAULTS = TaskDefaults(
         "kick": 3e-4,
         "speed_ripple": 0.0,
         "deviation_weight": 0.0125,
-        "load_rating": 140.0,
+        "reference_force": 140.0,
     },
 )

@@ -10,17 +10,16 @@ import json
 import tomllib
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
-from importlib import resources
 from pathlib import Path
 from typing import Any, NamedTuple
 
 import numpy as np
 import pyarrow as pa
 
+from benchmarks.sweeps.agreement import Agreement, agreement
 from chaosgym.errors import DatasetError
 from chaosgym.files import write_atomically
 from chaosgym.machines import MACHINES
-from chaosgym.sweeps.agreement import Agreement, agreement
 from chaosgym.sweeps.axes import Axis
 from chaosgym.sweeps.dataset import DATA_FILE, LabelledSweep, parquet_writer, read_sweep, schema, signal_columns
 from chaosgym.sweeps.plan import SweepPlan
@@ -37,7 +36,7 @@ class Recipe(NamedTuple):
 
 
 def _recipes() -> dict[str, Recipe]:
-    text = resources.files("chaosgym.sweeps").joinpath("datasets.toml").read_text(encoding="utf-8")
+    text = (Path(__file__).parents[2] / "datasets" / "datasets.toml").read_text(encoding="utf-8")
     return {
         name: Recipe(**{**options, "axes": tuple(options["axes"])}) for name, options in tomllib.loads(text).items()
     }

@@ -9,10 +9,11 @@ import pyarrow.parquet as pq
 import pytest
 from click.testing import CliRunner
 
-from chaosgym.cli import app
+from benchmarks.cli import app
+from benchmarks.sweeps import build
+from benchmarks.sweeps.build import RECIPES, Recipe, build_dataset, dataset_plan, drawn_digest, sample_of, write_sample
 from chaosgym.errors import DatasetError
-from chaosgym.sweeps import build, read_sweep, run_sweep
-from chaosgym.sweeps.build import RECIPES, Recipe, build_dataset, dataset_plan, drawn_digest, sample_of, write_sample
+from chaosgym.sweeps import read_sweep, run_sweep
 
 SHIPPED = Path(__file__).parents[2] / "datasets"
 
@@ -63,7 +64,7 @@ def changed(made, folder, column, value):
 def test_rows_that_differ_end_with_exit_code_1(made, tmp_path):
     """On the same platform one other digit is too many; the numbers are printed."""
     other = changed(made, tmp_path / "other", "peak_force_mean", 1.0)
-    command = ("dataset", "build", "impact-beam", "--out", str(made / "whole"))
+    command = ("build-dataset", "impact-beam", "--out", str(made / "whole"))
     found = CliRunner().invoke(app, [*command, "--sample", str(other)])
     assert found.exit_code == 1
     assert "0 of 15 rows identical, 15 of the same nature (the same sources" in found.output

@@ -20,6 +20,8 @@ from typing import Any, Literal, NamedTuple
 
 import numpy as np
 
+from benchmarks.fidelity.bounds import bounded_share
+from benchmarks.fidelity.extremes import extremes_of
 from chaosgym.errors import ChaosgymError
 from chaosgym.machines import Machine
 from chaosgym.machines.parameters import parameters_of, with_settings
@@ -126,7 +128,7 @@ def runs_of(machine: Machine) -> list[Run]:
     fixed = [rung for rung in ladder if with_settings(machine, {"fidelity": rung}).runs_fixed_steps]
     runs = [
         Run(extreme, rung, _changed(machine, {"fidelity": rung}, fields), None)
-        for extreme, fields in machine.extremes.items()
+        for extreme, fields in extremes_of(machine).items()
         for rung in ladder
     ]
     default = type(machine)().rung or "as it is"
@@ -183,4 +185,4 @@ def share_of_bound(record: CycleRecord) -> float:
     if not all(np.all(np.isfinite(value)) for value in values):
         return math.inf
     states = np.vstack([record.section, record.final_state.coordinates])
-    return record.machine.share_of_bound(states, record.peak_force)
+    return bounded_share(record.machine, states, record.peak_force)

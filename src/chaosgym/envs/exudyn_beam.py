@@ -20,8 +20,8 @@ from chaosgym.core import status
 from chaosgym.core.cycle import CycleArrays
 from chaosgym.core.modal_model import ModalImpactModel
 from chaosgym.errors import ChaosgymError, ParameterError
+from chaosgym.machines import ImpactBeam
 from chaosgym.machines.batch import VaryingBatch
-from chaosgym.machines.impact_beam.machine import ImpactBeam
 from chaosgym.machines.machine import Machine
 
 SOLVER, STEP = "RK44", 1e-5

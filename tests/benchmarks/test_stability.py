@@ -7,8 +7,18 @@ import pytest
 from hypothesis import example, given, settings
 from hypothesis import strategies as st
 
+from benchmarks.fidelity.extremes import extremes_of
+from benchmarks.fidelity.stability import (
+    Run,
+    StabilityCell,
+    StabilityMap,
+    runs_of,
+    share_of_bound,
+    stability_map,
+    try_run,
+)
+from benchmarks.fidelity.stability_figure import stability_figure
 from chaosgym.errors import ChaosgymError, ParameterError, SimulationError
-from chaosgym.fidelity.stability import Run, runs_of, share_of_bound, stability_map, try_run
 from chaosgym.machines import ImpactBeam, SliderCrank
 from chaosgym.machines.parameters import parameters_of
 from chaosgym.simulation import ExactEvents, RungeKutta4, simulate
@@ -55,7 +65,7 @@ def test_the_map_would_show_a_failure():
     assert 0.0 < share_of_bound(record) < 1.0
     assert share_of_bound(replace(record, section=1e6 * record.section)) > 1.0
     assert share_of_bound(replace(record, section=np.nan * record.section)) == np.inf
-    assert len(runs_of(PLAIN_BEAM)) > len(PLAIN_BEAM.extremes) * len(PLAIN_BEAM.fidelity_ladder)
+    assert len(runs_of(PLAIN_BEAM)) > len(extremes_of(PLAIN_BEAM)) * len(PLAIN_BEAM.fidelity_ladder)
 
 
 @pytest.mark.parametrize("rung", [rung for rung in ImpactBeam.fidelity_ladder])
@@ -244,3 +254,15 @@ def test_anywhere_in_the_admissible_box_of_the_crank(fields):
     except ChaosgymError:
         return
     assert share_of_bound(record) <= 1.0 + 1e-6
+
+
+def test_stability_figure_shows_rows_columns_and_forces():
+    """Extremes are rows, models are columns, and an answer shows its largest force."""
+    about = {"detail": "", "share_of_bound": 0.1, "seconds": 0.0}
+    cells = (
+        StabilityCell(extreme="force 0", model="draft", outcome="answer", largest_peak=12.5, **about),
+        StabilityCell(extreme="force 0", model="fine", outcome="named error", largest_peak=None, **about),
+    )
+    axes = stability_figure(StabilityMap("impact-beam", cells)).axes[0]
+    assert [text.get_text() for text in axes.texts] == ["12.5 N"]
+    assert [label.get_text() for label in axes.get_xticklabels()] == ["draft", "fine"]

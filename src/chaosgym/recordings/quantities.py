@@ -1,0 +1,112 @@
+"""Units as recorders write them, and what a title of a column says: its name and its unit.
+
+A unit is taken from brackets, a row of units or a property, never from a word of a name.
+"""
+
+import re
+
+from chaosgym.units import ALTERNATIVES, unit_as_listed
+
+FORCES = {**ALTERNATIVES["N"], "daN": 10.0, "MN": 1e6, "kgf": 9.80665, "gf": 9.80665e-3, "ozf": 0.2780138509537812}
+TIMES = {"s": 1.0, "ms": 1e-3, "us": 1e-6, "µs": 1e-6, "ns": 1e-9, "min": 60.0, "h": 3600.0}
+RATES = {"Hz": 1.0, "kHz": 1e3, "MHz": 1e6, "1/s": 1.0, "S/s": 1.0, "kS/s": 1e3, "MS/s": 1e6}
+VOLTS = {"V": 1.0, "mV": 1e-3, "µV": 1e-6, "uV": 1e-6}
+"""Units of force [N], of time [s], of a sampling rate [Hz] and of a voltage [V]."""
+
+SPEEDS = ("Hz", "rpm", "1/min", "min-1", "rad/s")
+"""Units of a speed."""
+
+_OTHERS = "g m/s² m/s2 m/s^2 m/s mm/s in/s m mm um µm in mil Pa kPa MPa bar psi V mV µV uV A mA Nm N·m FS kg gram"
+OTHERS = frozenset(_OTHERS.split())
+"""Units of quantities that are judged in their own unit."""
+
+_NEVER_JUDGED = ("deg", "°", "°C", "°F", "degC", "degF", "K", "C", "%", "-")
+UNITS = frozenset({*FORCES, *TIMES, *RATES, *SPEEDS, *OTHERS, *_NEVER_JUDGED}) - {"FS"}
+"""Units that a file may name."""
+
+_WORDS = {
+    "s": "second sec sekunde sekunden",
+    "ms": "millisecond milliseconds millis msec",
+    "us": "microsecond micros usec µsec",
+    "ns": "nanosecond nanos nsec",
+    "min": "minute",
+    "h": "hour hr",
+    "N": "newton",
+    "kN": "kilonewton",
+    "mN": "millinewton",
+    "MN": "meganewton",
+    "daN": "decanewton",
+    "lbf": "pound lb pound-force pounds-force",
+    "kgf": "kilogram-force kilopond kp",
+    "gf": "gram-force",
+    "ozf": "ounce-force",
+    "kg": "kilogram",
+    "gram": "gramme",
+    "V": "volt",
+    "mV": "millivolt",
+    "µV": "microvolt",
+    "A": "ampere amp",
+    "mA": "milliampere milliamp",
+    "Pa": "pascal",
+    "kPa": "kilopascal",
+    "MPa": "megapascal",
+    "Hz": "hertz",
+    "kHz": "kilohertz",
+    "m": "metre meter",
+    "mm": "millimetre millimeter",
+    "µm": "micrometre micrometer micron",
+    "in": "inch inches",
+    "deg": "degree",
+    "°C": "celsius",
+}
+WORDS = {word: unit for unit, words in _WORDS.items() for word in words.split()}
+WORDS |= {unit.casefold(): unit for unit in ("Hz", "kHz", "rpm", "lbf", "kgf", "daN", "psi", "bar", "degC", "gram")}
+"""Units by how they are written out, in small letters and the singular. A pound is one of force."""
+
+_SUFFIXES = "N kN mN daN lbf kgf gf s ms us ns rpm Hz kHz mV mm um"
+SUFFIXES = frozenset(_SUFFIXES.split())
+"""Units that may end a name after an underscore or "in": single letters such as A and V number channels as well."""
+
+CLOCK = re.compile(r"t|time\w*|\w*time|zeit\w*|\w*zeit|temps|\w*stamp|date\w*|datum|clock|elapsed", re.IGNORECASE)
+"""Words in the name of a column of instants."""
+
+
+def as_unit(text: str) -> str:
+    """Unit that a word means, with or without brackets; empty if it is none."""
+    word = text.strip().strip("[]()").strip().replace("\u03bc", "µ")
+    if word in UNITS:
+        return word
+    if word == "KN":
+        return "kN"
+    plain = word.casefold()
+    return WORDS.get(plain) or WORDS.get(plain.removesuffix("s"), "")
+
+
+def split_unit(title: str) -> tuple[str, str]:
+    """Name and unit of a title: ``Kraft [N]``, ``F (kN)``, ``force / N``, ``peak_N``, ``force in N``, ``millis``.
+
+    Examples
+    --------
+    >>> from chaosgym.recordings.quantities import split_unit
+    >>> split_unit("Force / kN"), split_unit("time_ms"), split_unit("Channel A")
+    (('Force', 'kN'), ('time', 'ms'), ('Channel A', ''))
+    """
+    text = title.strip()
+    if written := re.fullmatch(r"(.*?)[\s_]*[\[(]\s*([^\])]*?)\s*[\])]", text):
+        unit = as_unit(written[2])
+        if unit or "[" in text:
+            return written[1].strip() or text, unit or written[2]
+    if (written := re.fullmatch(r"(.+?)\s*/\s*(\S+)", text)) and as_unit(written[2]):
+        return written[1].strip(), as_unit(written[2])
+    if written := re.fullmatch(r"(.+?)(?:_|\s+in\s+)(\S+)", text):
+        unit = as_unit(written[2])
+        allowed = unit in SUFFIXES if written[2] in UNITS else len(written[2]) > 2
+        if unit and (allowed or (unit == "min" and CLOCK.fullmatch(written[1]))):
+            return written[1].strip(), unit
+    unit = as_unit(text)
+    return text, unit if unit in TIMES and len(text) > 1 and text.casefold() != "min" else ""
+
+
+def same_unit(one: str, other: str) -> bool:
+    """Whether two spellings are of one unit."""
+    return unit_as_listed(as_unit(one) or one) == unit_as_listed(as_unit(other) or other)
