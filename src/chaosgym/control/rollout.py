@@ -7,7 +7,7 @@ comparison, demo and pictures.
 """
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any, Protocol
 
 import numpy as np
@@ -86,6 +86,13 @@ class Played:
     hours: Array
     status: NDArray[np.int64]
     cycles_per_step: int
+
+    def job(self, place: int) -> "Played":
+        """Return one of the jobs alone, by its place among them."""
+        one, every = slice(place, place + 1), vars(self)
+        last = {name: every[name][one] for name in every if np.ndim(every[name]) == 1}
+        second = {name: every[name][:, one] for name in every if np.ndim(every[name]) > 1}
+        return replace(self, **last, **second)
 
     @property
     def returns(self) -> Array:
