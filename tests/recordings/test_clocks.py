@@ -63,6 +63,7 @@ def test_clocks_give_the_rate(clock, tmp_path):
     [
         ("time,force\n", lambda k, x: f"{50 * k},{x}", "rises in steps of 50 without a unit; .*20 if these are milli"),
         ("time,force\n", lambda k, x: f"{0.5 * k},{x}", "rises in steps of 0.5 without a unit; .*2000 if these are"),
+        ("Sample rate: 500 Hz\ntime,force\n", lambda k, x: f"{k / RATE:.3f},{x}", "of 0.001 .*the file states 500 Hz"),
         ("time,force\n", lambda k, x: f"13:32:{10 + k // 3000},{x}", "too coarse to tell samples apart; use --rate-hz"),
         ("time,force\n", lambda k, x: f"{1_000_000_000 + 500 * k},{x}", "in steps of 500 without a unit"),
         (
