@@ -254,7 +254,7 @@ def _diagnose_machine(
         result |= {"response_type": judged.type, "response_type_reason": judged.reason}
         result["attractors"] = None if motions is None else motions.as_dict()
         lines.append(f"  Type {judged.type}: {judged.reason}")
-        lines += [f"  {line}" for line in motions.lines] if motions else []
+        lines += [f"  {line}" for line in judged.looked]
     if check:
         compared = step_check(machine, verdict, budget=budget, sensor_error=sensor_error)
         result["step_check"] = compared.as_dict()

@@ -435,6 +435,9 @@ class _Search:
             place = self._arrived(start)
             if place is None:
                 place = self._added(self._proven(start, stage))
+            # a periodic motion may lie within the set of a chaotic one that died out
+            if place is None:
+                place = self._on_a_set(start)
             if place is None:
                 others.append(start)
             else:
@@ -444,6 +447,8 @@ class _Search:
         waiting: list[_Start] = []
         for start in others:
             place = self._arrived(start)
+            if place is None:
+                place = self._on_a_set(start)
             if place is None and self._diagnoses < MOST_DIAGNOSES:
                 place = self._added(self._diagnosed(start))
             if place is None:
@@ -474,11 +479,8 @@ class _Search:
         return max(1.0, float(np.max(np.linalg.norm(self._weight * motion.states, axis=1))))
 
     def _arrived(self, start: _Start) -> int | None:
-        """Number of the motion on which a start is, or None."""
-        record = start.record
-        if not self.motions or record is None:
-            return None
-        path = np.vstack([record.section[-TAIL:], record.final_state.coordinates])
+        """Number of the repeating motion on which a start is, or None."""
+        path = self._path(start)
         orbits = [place for place, one in enumerate(self.motions) if one.period]
         if orbits:
             now = self._distances(path[-1:])[:, 0]
@@ -488,10 +490,22 @@ class _Search:
             near = now[nearest] < ARRIVED * self._size(one) and now[nearest] <= APART * beside
             if near and self._nears(path, one):
                 return nearest
+        return None
+
+    def _on_a_set(self, start: _Start) -> int | None:
+        """Number of the set of states on which a start moves, or None."""
+        path = self._path(start)
+        assert start.record is not None
+        free = len(start.record) >= TAIL and not start.record.peak_force.any()
         for place, one in enumerate(self.motions):
-            if one.orbit is None and self._on_set(path, record, one):
+            if one.period is None and (free if one.neutral else self._on_set(path, one)):
                 return place
         return None
+
+    def _path(self, start: _Start) -> Array:
+        """The last states of a start, (k, n_states)."""
+        assert start.record is not None
+        return np.vstack([start.record.section[-TAIL:], start.record.final_state.coordinates])
 
     def _nears(self, path: Array, motion: Attractor) -> bool:
         """Whether a path came nearer to an orbit from period to period at the end, or is on it."""
@@ -499,10 +513,8 @@ class _Search:
         distance = np.min(np.linalg.norm(self._weight * (back[:, None] - motion.states), axis=2), axis=1)
         return bool(distance[0] < CLOSELY or np.all(distance[:-1] <= distance[1:]))
 
-    def _on_set(self, path: Array, record: CycleRecord, motion: Attractor) -> bool:
+    def _on_set(self, path: Array, motion: Attractor) -> bool:
         """Whether a start moves on a set."""
-        if motion.period is not None or not motion.peaks.any():
-            return False
         if len(motion.states) < LEAST_SET or len(path) < TAIL:
             return False
         from scipy.spatial import cKDTree  # slow to import, and few searches need it

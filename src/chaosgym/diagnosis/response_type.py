@@ -108,6 +108,11 @@ class ResponseType:
         return tuple(one.largest_peak for one in coexisting(self.attractors, self.centre))
 
     @property
+    def looked(self) -> tuple[str, ...]:
+        """The other motions, and how far was looked; empty if none were looked for."""
+        return () if self.attractors is None else self.attractors.lines
+
+    @property
     def coexists(self) -> bool:
         """Whether the centre repeats, but another initial state leads to a motion of another force or nature."""
         others = coexisting(self.attractors, self.centre)

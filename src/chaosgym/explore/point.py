@@ -10,7 +10,7 @@ import numpy as np
 
 from chaosgym.arrays import Array
 from chaosgym.classifier import classifier_for
-from chaosgym.diagnosis import MachineDiagnosis, diagnose
+from chaosgym.diagnosis import MachineDiagnosis, attractors, diagnose
 from chaosgym.errors import ChaosgymError, ParameterError, SimulationError
 from chaosgym.machines import FILE_ENDING, MACHINES, Machine
 from chaosgym.machines.parameters import by_field, changes_of, parameters_of, with_settings
@@ -21,6 +21,9 @@ from chaosgym.simulation import simulate
 
 BUDGET = 400
 """Cycles of the diagnosis: what is sure after some hundredths of a second."""
+
+STARTS = 16
+"""Random starts that look for other motions."""
 
 SHOWN_CYCLES, SAMPLES = 6, 300
 """Cycles of the time history and of the phase portrait, and samples of each."""
@@ -181,10 +184,23 @@ def view_of(machine: Machine) -> View:
         room=machine.room_of(judged.joint),
         nature=verdict.nature,
         headline=verdict.statement.headline,
-        lines=(*verdict.statement.lines()[1:], _votes(verdict), _classified(machine), _watched(heard)),
+        lines=(
+            *verdict.statement.lines()[1:],
+            *_beside(machine, verdict),
+            _votes(verdict),
+            _classified(machine),
+            _watched(heard),
+        ),
         sketch=machine.sketch(last, rows, float(np.abs(motion[:, 2]).max()) or 1.0),
         span=sketched * machine.cycle_period,
     )
+
+
+def _beside(machine: Machine, verdict: MachineDiagnosis) -> tuple[str, ...]:
+    """The other motions of a machine whose response repeats, and how far was looked."""
+    if verdict.nature != "periodic":
+        return ()
+    return attractors(machine, starts=STARTS, budget=BUDGET, centre=verdict).lines
 
 
 def _check_cost(machine: Machine) -> None:
