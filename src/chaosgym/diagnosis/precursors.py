@@ -190,8 +190,7 @@ def signs_of_chaos(verdict: MachineDiagnosis) -> tuple[Sign, ...]:
         --------
         >>> from chaosgym import diagnose
         >>> from chaosgym.diagnosis import signs_of_chaos
-        >>> from chaosgym.diagnosis.verdict import MachineDiagnosis
-    from chaosgym.machines import ImpactBeam
+        >>> from chaosgym.machines import ImpactBeam
         >>> verdict = diagnose(ImpactBeam(excitation_frequency=12.0))
         >>> [(sign.name, sign.present) for sign in signs_of_chaos(verdict)]
         [('criteria', False), ('period doubling', False), ('period three', False), ('long bouncing', False)]
