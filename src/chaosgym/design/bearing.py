@@ -191,8 +191,7 @@ def variation_region(
         Examples
         --------
         >>> from chaosgym.design import variation_region
-        >>> from chaosgym.design.told import listed
-    from chaosgym.diagnosis import Tolerance
+        >>> from chaosgym.diagnosis import Tolerance
         >>> variation_region(chaosgym.ImpactBeam(), {"clearance": Tolerance(0.1)}, region=2)
         {'clearance': Tolerance(value=0.2100000000000002, relative=True)}
     """
