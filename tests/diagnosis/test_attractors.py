@@ -100,7 +100,7 @@ def test_what_is_said_tells_how_far_was_looked():
     found = attractors(beside, carried=carried_states(beside))
     assert "run-down from 30 Hz" in found.searched
     (other,) = found.other_motions
-    assert other.startswith("another motion: periodic, period 1, up to 3.6")
+    assert other.startswith("periodic, period 1, up to 3.6")
     assert "of 48 random starts (" in other
     assert "random starts were not tried" in attractors(beside, starts=0).searched
     with pytest.raises(DiagnosisError, match="starts = -1 is out of range"):

@@ -35,14 +35,14 @@ class Coexistence:
 
     @property
     def lines(self) -> list[str]:
-        """All of it for people."""
+        """Spans and shock for people."""
         unit = parameters_of(self.machine)[self.machine.speed_field].unit
-        *others, looked = self.attractors.lines
-        told = ["this motion", *others] if self.spans else []
         lines = [
-            f"{words}; {span.words(unit)}" if span else words for words, span in zip(told, self.spans, strict=True)
+            f"{'this motion' if not number else f'motion {number + 1}, {one.words},'} is {span.words(unit)}"
+            for number, (one, span) in enumerate(zip(self.attractors.motions, self.spans, strict=False))
+            if span
         ]
-        return [*lines, looked, *([self._shock_line(self.shock)] if self.shock else [])]
+        return [*lines, *([self._shock_line(self.shock)] if self.shock else [])]
 
     def _shock_line(self, shock: Shock) -> str:
         if shock.knock is None:
@@ -56,7 +56,6 @@ class Coexistence:
         """Return plain values for JSON."""
         shock = self.shock
         return {
-            "attractors": self.attractors.as_dict(),
             "stable_spans": [None if span is None else span.as_dict() for span in self.spans],
             "shock": None
             if shock is None

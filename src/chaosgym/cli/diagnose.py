@@ -128,7 +128,9 @@ def diagnose(
             raise click.UsageError("--sensor-sigma belongs to --peaks or --series")
         with patience("diagnose"):
             sensor_error = measured.sensor_error or 0.0
-            result, lines, verdict, motions = _diagnose_machine(machine, budget, types, step_check, sensor_error)
+            result, lines, verdict, motions = _diagnose_machine(
+                machine, budget, types, margins, step_check, sensor_error
+            )
             if margins:
                 _add_margins(machine, verdict, reach, kicks or 0, result, lines, motions)
         draw(picture, lambda plots: plots.diagnosis_figure(verdict), result, lines)
@@ -220,13 +222,20 @@ def _forces(machine: Any, verdict: Any) -> tuple[dict[str, Any], list[str]]:
 
 
 def _diagnose_machine(
-    machine: Any, budget: int, types: bool, check: bool, sensor_error: float
+    machine: Any, budget: int, types: bool, margins: bool, check: bool, sensor_error: float
 ) -> tuple[dict[str, Any], list[str], Any, Any]:
     """The verdict, and the motions of the machine if they were looked for."""
-    from chaosgym.diagnosis import diagnose, response_type, signs_of_chaos
+    from chaosgym.diagnosis import attractors, diagnose, response_type, signs_of_chaos
+    from chaosgym.diagnosis.carried import carried_states
     from chaosgym.diagnosis.step_check import step_check
 
-    verdict = diagnose(machine, budget=budget, sensor_error=sensor_error)
+    verdict, judged, motions = diagnose(machine, budget=budget, sensor_error=sensor_error), None, None
+    if types:
+        judged = response_type(machine, budget=budget, sensor_error=sensor_error, centre=verdict)
+        verdict, motions = judged.centre, judged.attractors
+    elif margins and verdict.nature == "periodic":
+        motions = attractors(machine, centre=verdict, carried=carried_states(machine))
+        verdict = motions.told_of(verdict)
     told, forces = _forces(machine, verdict)
     exponent = verdict.evidence["largest_lyapunov_exponent_per_cycle"]
     result = {
@@ -247,14 +256,11 @@ def _diagnose_machine(
     lines += [f"  {sign.line}" for sign in signs]
     if not verdict.judged.peak_force.any():
         lines.append(f"  {result['warnings'][-1]}")
-    motions = None
-    if types:
-        judged = response_type(machine, budget=budget, sensor_error=sensor_error, centre=verdict)
-        motions = judged.attractors
-        result |= {"response_type": judged.type, "response_type_reason": judged.reason}
+    if types or margins:
         result["attractors"] = None if motions is None else motions.as_dict()
+    if judged:
+        result |= {"response_type": judged.type, "response_type_reason": judged.reason}
         lines.append(f"  Type {judged.type}: {judged.reason}")
-        lines += [f"  {line}" for line in judged.looked]
     if check:
         compared = step_check(machine, verdict, budget=budget, sensor_error=sensor_error)
         result["step_check"] = compared.as_dict()
@@ -279,8 +285,6 @@ def _add_margins(
     lines += [f"    {line}" for line in _margin_lines(machine, found, reach)]
     beside = coexistence(machine, verdict, motions, knocks=kicks)
     result["coexistence"] = beside.as_dict()
-    for line in motions.lines if motions else ():
-        lines.remove(f"  {line}")
     lines += [f"  {line}" for line in beside.lines]
 
 

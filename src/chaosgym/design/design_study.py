@@ -83,7 +83,7 @@ class DesignStudy:
         lines = [
             f"{found.machine.name}: {found.judged}",
             f"  Type {found.type}: {found.response.reason}; {found.evaluation.method.partition(': ')[2]}",
-            *(f"  {line}" for line in found.response.looked),
+            f"  other motions: {found.response.centre.statement.other_motions}",
             f"  {found.series.told}",
             *(f"  {line}" for line in self.combination.told),
             *(f"  {line}" for line in self.duty_told),

@@ -187,7 +187,7 @@ class Attractors:
 
     @property
     def searched(self) -> str:
-        """One sentence on how far was looked, and what follows from it."""
+        """A phrase on how far was looked, and what follows from it."""
         random = f"{self.starts} random starts up to {self.box.reach:.2g} {self.box.measure}"
         looked = ", ".join([random] if self.starts else ["rest", "its mirror image", "half of it"])
         looked = " and ".join([looked, *self.carried])
@@ -204,8 +204,12 @@ class Attractors:
 
     @property
     def other_motions(self) -> tuple[str, ...]:
-        """A sentence on every motion but the first, with its share of the starts."""
-        return tuple(f"another motion: {one.words}, {self._reached(one)}" for one in self.motions[1:])
+        """A phrase on every motion but the first, with its share of the starts."""
+        return tuple(f"{one.words}, {self._reached(one)}" for one in self.motions[1:])
+
+    def told_of(self, verdict: MachineDiagnosis) -> MachineDiagnosis:
+        """The verdict on the first motion, with the others and how far was looked."""
+        return replace(verdict, other_motions=self.other_motions, searched=self.searched)
 
     def _reached(self, one: Attractor) -> str:
         ways = list(one.from_starts)
@@ -213,11 +217,6 @@ class Attractors:
             share, low, high = self.share(one)
             ways.insert(0, f"{one.random_starts} of {self.starts} random starts ({share:.0%}; {low:.0%} to {high:.0%})")
         return f"from {', '.join(ways)}"
-
-    @property
-    def lines(self) -> tuple[str, ...]:
-        """What people are told: the other motions, and how far was looked."""
-        return (*self.other_motions, f"looked: {self.searched}")
 
     def as_dict(self) -> dict[str, Any]:
         """Return plain values for JSON."""

@@ -83,7 +83,7 @@ class ResponseType:
     reason
         One sentence for people.
     centre
-        Verdict on the nominal machine.
+        Verdict on the nominal machine, with its other motions.
     largest_peak
         Largest peak force of its settled cycles, both sides [N].
     neighbours
@@ -106,11 +106,6 @@ class ResponseType:
     def coexisting_peaks(self) -> tuple[float, ...]:
         """Largest peak of each of the other motions at the centre [N]."""
         return tuple(one.largest_peak for one in coexisting(self.attractors, self.centre))
-
-    @property
-    def looked(self) -> tuple[str, ...]:
-        """The other motions, and how far was looked; empty if none were looked for."""
-        return () if self.attractors is None else self.attractors.lines
 
     @property
     def coexists(self) -> bool:
@@ -225,7 +220,7 @@ def response_type(
     return ResponseType(
         type=kind,
         reason=reason,
-        centre=centre,
+        centre=centre if found is None else found.told_of(centre),
         largest_peak=largest,
         neighbours=neighbours,
         attractors=found,

@@ -185,8 +185,7 @@ def view_of(machine: Machine) -> View:
         nature=verdict.nature,
         headline=verdict.statement.headline,
         lines=(
-            *verdict.statement.lines()[1:],
-            *_beside(machine, verdict),
+            *_with_others(machine, verdict).statement.lines()[1:],
             _votes(verdict),
             _classified(machine),
             _watched(heard),
@@ -196,11 +195,11 @@ def view_of(machine: Machine) -> View:
     )
 
 
-def _beside(machine: Machine, verdict: MachineDiagnosis) -> tuple[str, ...]:
-    """The other motions of a machine whose response repeats, and how far was looked."""
+def _with_others(machine: Machine, verdict: MachineDiagnosis) -> MachineDiagnosis:
+    """The verdict with the other motions of a machine whose response repeats, and how far was looked."""
     if verdict.nature != "periodic":
-        return ()
-    return attractors(machine, starts=STARTS, budget=BUDGET, centre=verdict).lines
+        return verdict
+    return attractors(machine, starts=STARTS, budget=BUDGET, centre=verdict).told_of(verdict)
 
 
 def _check_cost(machine: Machine) -> None:

@@ -41,7 +41,7 @@ class Statement(NamedTuple):
     horizon
         How long it was seen.
     other_motions
-        Motions from other initial states, or how far was looked for them.
+        Motions from other initial states, and how far was looked for them.
     condition
         What the nature rests on that is not known.
     tells_more
@@ -150,7 +150,7 @@ class Diagnosis:
             reason=self.reason,
             transient=self._transient(),
             horizon=self._horizon(),
-            other_motions="; ".join(self.other_motions) or self.searched,
+            other_motions="; ".join(filter(None, (*self.other_motions, self.searched))),
             condition=self.condition,
             tells_more=_either(self.tells_more),
         )
