@@ -187,13 +187,14 @@ def measured_runs(given: Measured, *, several: bool = False, of_force: bool = Fa
                 pulses_per_revolution=given.pulses_per_revolution or 1,
                 scale=given.scale,
             )
-            found.append((signal, cut.peaks, cut.resolution, (f"{len(cut.peaks)} cycles", *cut.notes), cut.condition))
+            notes = (f"{len(cut.peaks)} cycles", *cut.notes)
+            found.append((signal, cut.peaks, cut.resolution, notes, cut.condition, cut.sampled))
     else:
         chosen = forces if several or names else lambda *of: [choose_force(*of)]
         for signal in chosen(recording, given.column, given.unit, given.scale):
-            found.append((signal, check_peaks(signal, recording), 0.0, (), ""))
+            found.append((signal, check_peaks(signal, recording), 0.0, (), "", None))
     runs = []
-    for signal, peaks, resolution, notes, condition in found:
+    for signal, peaks, resolution, notes, condition, sampled in found:
         if of_force:
             _ask_for_force(recording.source, signal)
         try:
@@ -203,6 +204,7 @@ def measured_runs(given: Measured, *, several: bool = False, of_force: bool = Fa
                 sensor_sigma=in_readings(given.sensor_sigma, signal.unit),
                 resolution=resolution,
                 unit=signal.unit,
+                sampled=sampled,
             )
         except DiagnosisError as error:
             run = f", run {signal.name!r}" if len(found) > 1 else ""
@@ -293,7 +295,7 @@ def run_lines(subject: str, run: Run) -> list[str]:
 
     told = summary(run.peaks)
     how = force_line(told) if run.unit == "N" else reading_line(told, run.unit)
-    lines = verdict_lines(subject, run.verdict.diagnosis, [how], run.verdict.notes)
+    lines = verdict_lines(subject, run.verdict.diagnosis, [how], run.verdict.remarks)
     return [*lines, *(f"  {note}" for note in run.notes)]
 
 

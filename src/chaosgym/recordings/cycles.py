@@ -12,6 +12,7 @@ import numpy as np
 from chaosgym.arrays import Array
 from chaosgym.errors import DiagnosisError
 from chaosgym.recordings.columns import Signal, choose_force, named_column
+from chaosgym.recordings.description import Sampled
 from chaosgym.recordings.read import Recording
 from chaosgym.recordings.sampling import Sampling, sampling
 from chaosgym.recordings.tachometer import Turns, turns_of
@@ -48,6 +49,8 @@ class CyclePeaks:
         How the cycle is known, what is missing, and doubts.
     condition
         "if the cycle is 49.4 ms" where it was estimated; empty where it is known.
+    sampled
+        Samples a cycle and cycles a second; None with a tachometer.
     """
 
     peaks: Array
@@ -56,6 +59,7 @@ class CyclePeaks:
     period: float
     notes: tuple[str, ...]
     condition: str = ""
+    sampled: Sampled | None = None
 
 
 def cycle_period(rpm: float | None, hz: float | None, period_s: float | None) -> float | None:
@@ -206,7 +210,8 @@ def cycle_peaks(
         notes.append(f"{dropped} cycles left out: samples are missing")
     if len(peaks) == 0:
         raise DiagnosisError(f"the series holds no whole cycle of {duration(cycle)}")
-    return CyclePeaks(peaks, kept, spread, cycle, tuple(notes), condition)
+    sampled = Sampled(cycle / instants.step, 1.0 / cycle) if turns is None else None
+    return CyclePeaks(peaks, kept, spread, cycle, tuple(notes), condition, sampled)
 
 
 def _filled(value: Array) -> Array:
