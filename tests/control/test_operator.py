@@ -103,7 +103,7 @@ def test_what_is_no_reading_is_skipped(policy):
     operator.start(speed=20.0, demand=20.0)
     seen = {"impacts": 12.0, "bouncing": 0.6}
     loud = np.tile([60.0, 90.0, 75.0], 4)
-    for _ in range(20):
+    for _ in range(21):
         trim = operator.next(loud, **seen) - operator.demand
     lost = [[np.nan] * 10, [80.0, np.nan] * 5, [1e9] * 10, [0.0] * 10]
     speeds = [operator.next(peaks, **seen) for peaks in lost[:2]]
@@ -130,7 +130,7 @@ def test_the_longest_stretch_of_finite_peaks_is_the_reading():
 
 
 def test_the_measured_speed_is_what_a_policy_sees():
-    """A drive that stands at 19 Hz: kriging's memory has its forces at 19 Hz, and set-points go on from the last one."""
+    """A drive that stands at 19 Hz: kriging remembers forces at 19 Hz, and set-points go on from the last one."""
     operator = chaosgym.Operator(Kriging(), BEAM)
     operator.start(speed=19.0, demand=22.0)
     speeds = [operator.next([80.0] * 10, speed=19.0) for _ in range(4)]

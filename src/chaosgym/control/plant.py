@@ -3,8 +3,8 @@
 A plant has two methods: ``reset()``, before a job, and ``run(speed, cycles)``, which runs it for some cycles at
 a speed and returns the largest force of each cycle [N]; with two stops (cycles, 2), the largest and the smallest force
 of each. A mapping may tell more: ``peaks``, the measured ``speed``, and what a trained policy looks at, ``impacts``
-(contacts a cycle) and ``bouncing`` (share of the half cycle on one side). A method ``stop()`` brings the machine to rest;
-it is called after every job, however that ends.
+(contacts a cycle) and ``bouncing`` (share of the half cycle on one side). A method ``stop()`` brings the machine to
+rest; it is called after every job, however that ends.
 """
 
 import json
@@ -277,7 +277,7 @@ class _Log:
 
 
 def work(plant: Plant, operator: Operator, job: int = 0, name: str = "") -> Worked:
-    """Run a job of the operator's task at a plant, with demands that the number ``job`` draws; ``stop()`` it at the end.
+    """Run a job of the operator's task at a plant, by demands that the number ``job`` draws, and ``stop()`` it.
 
     Raises
     ------
@@ -311,12 +311,10 @@ def _play(plant: Plant, operator: Operator, job: int, name: str, log: _Log) -> N
         speed = operator.next(peaks[-cycles:].max(axis=-1), demand=demand, **told)
         where = f"step {step} of {task.steps}, cycles {(step - 1) * cycles + 1} to {step * cycles}"
         peaks, told = _readings(plant, speed, cycles, name, where)
-        for column, value in zip(
-            (log.speed, log.demand, log.peaks, log.measured),
-            (speed, demand, peaks, told.get("speed", np.nan)),
-            strict=True,
-        ):
-            column.append(value)
+        log.speed.append(speed)
+        log.demand.append(demand)
+        log.peaks.append(peaks)
+        log.measured.append(told.get("speed", np.nan))
 
 
 def _readings(plant: Plant, speed: float, cycles: int, name: str, where: str) -> tuple[Array, dict[str, float]]:
