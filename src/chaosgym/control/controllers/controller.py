@@ -11,6 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from chaosgym.arrays import Array
+from chaosgym.control.readings import Readings
 from chaosgym.envs.kernels.steps import PLACE
 from chaosgym.envs.memory import irregularity
 from chaosgym.envs.task import Task
@@ -36,18 +37,20 @@ class Controller:
     def start(self, envs: Any) -> None:
         """Begin the jobs of a vector environment that has been reset."""
         self.task, self.count = envs.task, envs.num_envs
+        self._readings = Readings(self.task, self.count)
         self.begin(envs)
 
     def begin(self, envs: Any) -> None:
         """Forget the last jobs."""
 
     def __call__(self, observations: Observations) -> NDArray[np.float32]:
-        """Return the actions (n, 1)."""
+        """Return the actions (n, 1); a step without a usable reading holds, as ``control.readings`` says."""
+        observations = self._readings.take(observations)
         speeds = self.speeds(observations)
         if self.task.drive == "motor":  # the set-point is ahead by what the motor slipped in the last step
             speeds = speeds + added(observations, self.task, "set_point") - seen(observations, "speed")
         speeds = np.clip(speeds, self.task.lowest_speed, self.task.highest_speed)
-        return speeds[:, None].astype(np.float32)
+        return self._readings.answer(speeds[:, None].astype(np.float32))
 
     def speeds(self, observations: Observations) -> Array:
         """Return the speeds (n,) to go to."""
