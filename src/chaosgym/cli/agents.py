@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
-from chaosgym.cli.machine_options import Quantity
+from chaosgym.cli.options import Quantity
 from chaosgym.cli.output import AS_JSON, emit, patience, picture_path, plot_option
 
 if TYPE_CHECKING:
