@@ -6,9 +6,11 @@ fleets are rows too. The promise: nowhere below following the demand by more tha
 
 import json
 import warnings
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable, Iterator, Mapping
+from contextlib import contextmanager, nullcontext
 from pathlib import Path
 from typing import Any
+from unittest.mock import patch
 
 import numpy as np
 from numpy.typing import NDArray
@@ -22,6 +24,7 @@ from chaosgym.control.rollout import Policy, play
 from chaosgym.control.scores import MADE_WORSE, difference
 from chaosgym.control.statistics import paired_difference
 from chaosgym.envs.kernels.steps import PLACE
+from chaosgym.machines.impact_beam import ImpactBeam
 
 Array = NDArray[Any]
 
@@ -50,6 +53,7 @@ ROWS: Mapping[str, Mapping[str, Any]] = {
     "contact damping x0.5": {"contact_damping": 10.0},
     "force +20 %": {"force_amplitude": 21.36},
     "force -20 %": {"force_amplitude": 14.24},
+    "second harmonic of the force, 20 %": {"flaw": "second harmonic"},
     "clearance +30 %": {"clearance": 0.1651e-3},
     "clearance -30 %": {"clearance": 0.0889e-3},
     "density +2 %": {"density": 8007.0},
@@ -84,13 +88,13 @@ class Flawed:
 
     knows = "measurements"
 
-    def __init__(self, policy: Policy, flaw: str) -> None:
-        self.policy, self.flaw, self.keywords = policy, flaw, policy.keywords
+    def __init__(self, policy: Policy, flaw: str, seed: int = FIRST_SEED) -> None:
+        self.policy, self.flaw, self.keywords, self._seed = policy, flaw, policy.keywords, seed
 
     def start(self, envs: Any) -> None:
         """Begin jobs."""
         self.policy.start(envs)
-        self._random, self._last = np.random.default_rng(FIRST_SEED), np.zeros((envs.num_envs, 0))
+        self._random, self._last = np.random.default_rng(self._seed), np.zeros((envs.num_envs, 0))
 
     def __call__(self, observations: Array) -> Array:
         """The policy's actions, as the drive carries them out."""
@@ -118,6 +122,23 @@ class Flawed:
         return told
 
 
+SECOND = 0.2
+"""Amplitude of the second harmonic of the force, over that of the first."""
+
+
+@contextmanager
+def second_harmonic() -> Iterator[None]:
+    """Let every impact beam be driven by a second harmonic too, in phase with the first."""
+    usual = ImpactBeam.reduce
+
+    def reduce(beam: ImpactBeam) -> Any:
+        model = usual(beam)
+        return model._replace(drive=np.concatenate([model.drive, SECOND * model.drive], axis=1))
+
+    with patch.object(ImpactBeam, "reduce", reduce):
+        yield
+
+
 PLAYERS = ("follow", "shipped", "guarded")
 
 
@@ -129,9 +150,9 @@ def returns_of(row: str, seeds: range) -> dict[str, list[float]]:
     guard = GuardedPolicy(agent)
     returns: dict[str, list[float]] = {}
     for name, player in zip(PLAYERS, (Follow(), agent, guard), strict=True):
-        with warnings.catch_warnings():
+        with warnings.catch_warnings(), second_harmonic() if flaw == "second harmonic" else nullcontext():
             warnings.filterwarnings("ignore", "no usable reading")
-            played = play(player if flaw is None else Flawed(player, flaw), seeds=seeds, **changed)
+            played = play(player if flaw is None else Flawed(player, flaw, seeds.start), seeds=seeds, **changed)
         returns[name] = played.returns.tolist()
     return returns | {"foreign": (~guard.trusted).astype(float).tolist()}
 

@@ -273,9 +273,11 @@ def test_bad_calls_are_named() -> None:
 
 
 def test_what_is_lost_or_clipped_is_said():
-    """Options after an autoreset, actions outside the box, and a seed that is none; each in one line, the first once."""
+    """Options after an autoreset, actions outside the box, and a seed that is none; each in one line."""
     envs = gym.make_vec(BEAM, num_envs=2, steps=2, action="continuous", autoreset_mode="SameStep").unwrapped
-    with pytest.raises(ParameterError, match=r"seed = 7.0 is not usable; allowed: one whole number, or 2 whole numbers"):
+    with pytest.raises(
+        ParameterError, match=r"seed = 7.0 is not usable; allowed: one whole number, or 2 whole numbers"
+    ):
         envs.reset(seed=7.0)
     _, info = envs.reset(seed=7, options={"machine": 5})
     assert info["machine"].tolist() == [5, 5]
@@ -285,7 +287,9 @@ def test_what_is_lost_or_clipped_is_said():
         _, _, ended, _, info = envs.step(inside)
     assert ended.all()
     assert info["machine"].tolist() == [-1, -1]
-    with pytest.warns(UserWarning, match="actions outside the box are clipped; allowed with action='continuous': -1 to 1"):
+    with pytest.warns(
+        UserWarning, match="actions outside the box are clipped; allowed with action='continuous': -1 to 1"
+    ):
         envs.step(3.0 * np.ones((2, 2), np.float32))
     for _ in range(4):
         envs.step(inside)

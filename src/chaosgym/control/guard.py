@@ -1,9 +1,9 @@
 """A guard for trained policies: on a machine whose readings were unlikely in training, it follows the demand.
 
-A trained policy knows what is usual at each speed: mean and deviation of its readings over the machines of training. The
-guard takes the mean square of the readings of a settled step in these units, and its mean over the last steps of the
-job. On a machine of training that is about 1. Above ``UNLIKELY`` the policy is not asked again in this job. Until the
-first settled step, which is one at the demand, it is not asked either.
+A trained policy knows what is usual at each speed: mean and deviation of its readings over the machines of training.
+The guard takes the mean square of the readings of a settled step in these units, and its mean over the last steps of
+the job. On a machine of training that is about 1. Above ``UNLIKELY`` the policy is not asked again in this job. Until
+the first settled step, which is one at the demand, it is not asked either.
 """
 
 from typing import Any
@@ -25,6 +25,12 @@ the share of machines that were foreign, on those of training too.
 
 MEMORY = 10
 """Settled steps that the mean is over."""
+
+
+def can_guard(policy: Any) -> bool:
+    """Whether a policy sets speeds or trims, and knows what was usual in training."""
+    of_speeds = isinstance(policy, Controller) or policy.keywords.get("action") == "trim"
+    return of_speeds and hasattr(policy, "unusual") and getattr(policy, "usual", True) is not None
 
 
 class GuardedPolicy(Controller):
@@ -65,8 +71,7 @@ class GuardedPolicy(Controller):
         super().__init__()
         self.policy: Any = policy
         self.unlikely = unlikely
-        of_speeds = isinstance(policy, Controller) or policy.keywords.get("action") == "trim"
-        if not hasattr(policy, "unusual") or not of_speeds or getattr(policy, "usual", True) is None:
+        if not can_guard(policy):
             raise ParameterError(
                 f"{type(policy).__name__} can't be guarded; allowed: a learned map, or a trained policy of trims with "
                 "a memory, which know what is usual"
