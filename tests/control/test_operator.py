@@ -145,7 +145,8 @@ def test_speeds_stay_within_the_drive():
     random = np.random.default_rng(5)
     operator = chaosgym.Operator(lambda observation: [random.choice([-1e9, 5.0, 30.0, 1e9])], BEAM, action="speed")
     operator.start(speed=20.0, demand=22.0)
-    speeds = [20.0, *(operator.next([80.0] * 10, impacts=9.0, bouncing=0.5) for _ in range(60))]
+    with pytest.warns(UserWarning, match="actions outside the box are clipped; allowed with action='speed': 10 to 24"):
+        speeds = [20.0, *(operator.next([80.0] * 10, impacts=9.0, bouncing=0.5) for _ in range(60))]
     task = operator.task
     assert task.lowest_speed == min(speeds) < max(speeds) == task.highest_speed
     assert np.abs(np.diff(speeds)).max() <= task.slew_limit

@@ -69,8 +69,8 @@ def stable_span(machine: Machine, orbit: PeriodicOrbit) -> StableSpan:
     normal = np.append(np.zeros(len(orbit.state)), 1.0)
     try:
         family, start = better_section(*family.with_mirror(family.solve(place, normal)))
-    except NotFollowedError as reason:
-        end = End(own, None, f"not followed: {reason}")
+    except NotFollowedError as error:
+        end = End(own, None, f"not followed: {error}")
         return StableSpan(end, end)
     return StableSpan(*(_end(family, start, side) for side in (-1.0, 1.0)))
 
@@ -79,8 +79,8 @@ def _end(family: OrbitFamily, start: OrbitPoint, side: float) -> End:
     begun = replace(start, tangent=side * start.tangent)
     try:
         ahead = stretch(family, begun, until=lambda one: one.loses_stability, closely=False)
-    except NotFollowedError as reason:
-        return End(family.value(start.x[-1]), None, f"not followed: {reason}")
+    except NotFollowedError as error:
+        return End(family.value(start.x[-1]), None, f"not followed: {error}")
     lost = [each.bifurcation for each in ahead.found if each.bifurcation.loses_stability or each.bifurcation.ends]
     if lost:
         return End(lost[0].value, lost[0].kind)

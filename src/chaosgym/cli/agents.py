@@ -180,13 +180,18 @@ def _at_plant(
 ) -> None:
     """A job at a machine of the user's, beside following the demand there; what was played is told in any case."""
     from chaosgym.control.controllers import Follow, Kriging
+    from chaosgym.control.guard import GuardedPolicy, can_guard
     from chaosgym.control.operator import Operator
     from chaosgym.control.plant import Lines, PlantError, Worked, plant_of, work
     from chaosgym.control.policies import load_policy
     from chaosgym.control.rollout import Policy
 
-    agent: Policy = Kriging() if policy is None else load_policy(policy)
-    operators = {type(agent).__name__: Operator(agent, env), "following the demand": Operator(Follow(), env)}
+    agent: Policy = Kriging()
+    if policy is not None:
+        trained = load_policy(policy)
+        agent = GuardedPolicy(trained) if can_guard(trained) else trained
+    name_of_agent = type(getattr(agent, "policy", agent)).__name__
+    operators = {name_of_agent: Operator(agent, env), "following the demand": Operator(Follow(), env)}
     plant = plant_of(name, **_named_values(arguments))
     played: dict[str, Worked] = {}
     failure: PlantError | None = None
@@ -203,7 +208,7 @@ def _at_plant(
         jobs = list(played.values())
         whole = failure is None and jobs[0].damage > 0.0
         life = jobs[1].damage / jobs[0].damage if whole else None
-        result = {"agent": type(agent).__name__, "env": env, "plant": name, "job": machine, **jobs[0].as_dict()}
+        result = {"agent": name_of_agent, "env": env, "plant": name, "job": machine, **jobs[0].as_dict()}
         result |= {"life": life, "follow": jobs[1].as_dict() if len(jobs) > 1 else None}
         result |= {} if failure is None else {"failure": str(failure)}
         told = [line for who, job in played.items() for line in job.lines(who)]

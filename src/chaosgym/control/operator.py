@@ -12,6 +12,7 @@ from numpy.typing import ArrayLike, NDArray
 from chaosgym.arrays import Array
 from chaosgym.control.controllers import Controller
 from chaosgym.control.evaluation import policy_of
+from chaosgym.control.guard import GuardedPolicy
 from chaosgym.control.policies.learned_map import LearnedMap
 from chaosgym.control.readings import FIRST_FELT, usable
 from chaosgym.core.compilation import call
@@ -83,6 +84,11 @@ class Operator:
         self.demand, self.lost = float("nan"), 0
 
     @property
+    def foreign(self) -> bool | None:
+        """Whether the machine is foreign to a guarded policy; None without a guard."""
+        return not self.policy.trusted[0] if isinstance(self.policy, GuardedPolicy) else None
+
+    @property
     def speed(self) -> float:
         """Speed that the machine is to run at, in the unit of the machine's speed field."""
         return float(self._job["set_point"][0])
@@ -148,7 +154,8 @@ class Operator:
             raise ParameterError(
                 f"peaks of shape {felt.shape} are not usable; allowed: {FEWEST} or more forces from 0 N on"
             )
-        looks = isinstance(self.policy, LearnedMap) or not isinstance(self.policy, Controller)
+        inner = self.policy.policy if isinstance(self.policy, GuardedPolicy) else self.policy
+        looks = isinstance(inner, LearnedMap) or not isinstance(inner, Controller)
         if looks and (impacts is None or bouncing is None):
             raise ParameterError("a trained policy looks at impacts and bouncing too; give both, or use Kriging()")
         for name, value, high in (("impacts", impacts, np.inf), ("bouncing", bouncing, 1.0)):

@@ -191,6 +191,8 @@ class Worked:
         Of the joint by the peaks that were measured, see ``chaosgym.envs.task``.
     lost
         Steps without a usable reading, see ``chaosgym.control.readings``.
+    foreign
+        Whether a guard found the machine foreign to its policy, and followed the demand; None without a guard.
     """
 
     speed: Array
@@ -200,6 +202,7 @@ class Worked:
     largest_force: float
     damage: float
     lost: int
+    foreign: bool | None
 
     @property
     def ran(self) -> Array:
@@ -219,6 +222,8 @@ class Worked:
             "mean_peak_force_N": [value if np.isfinite(value) else None for value in self.mean_peak.tolist()],
             "steps_without_reading": self.lost,
         }
+        if self.foreign is not None:
+            told["foreign"] = self.foreign
         if self.measured_speed is not None:
             told["measured_speed"] = self.ran.tolist()
             told["largest_miss_of_the_drive"] = float(np.abs(self.ran - self.speed).max())
@@ -240,6 +245,8 @@ class Worked:
                 f"  the drive did not reach the speed that was set: {miss.mean():.2f} off on average, at worst "
                 f"{self.ran[at]:.2f} instead of {self.speed[at]:.2f} in step {at + 1}"
             )
+        if self.foreign:
+            told.append("  this machine is foreign to the policy, so the guard followed the demand")
         return told + ([f"  no usable reading in {self.lost} of {len(self.speed)} steps"] if self.lost else [])
 
 
@@ -253,7 +260,7 @@ class _Log:
     peaks: list[Array] = field(default_factory=list)
     measured: list[float] = field(default_factory=list)
 
-    def worked(self, lost: int) -> Worked | None:
+    def worked(self, lost: int, foreign: bool | None) -> Worked | None:
         """The job; None without a step."""
         if not self.peaks:
             return None
@@ -273,6 +280,7 @@ class _Log:
             largest_force=float(finite.max()),
             damage=float(self.task.damage(finite.reshape(-1, finite.shape[-1])).max()),
             lost=lost,
+            foreign=foreign,
         )
 
 
@@ -290,9 +298,9 @@ def work(plant: Plant, operator: Operator, job: int = 0, name: str = "") -> Work
             _play(plant, operator, job, name, log)
     except ParameterError as error:
         told = PlantError(str(error))
-        told.worked = log.worked(operator.lost)
+        told.worked = log.worked(operator.lost, operator.foreign)
         raise told from error
-    worked = log.worked(operator.lost)
+    worked = log.worked(operator.lost, operator.foreign)
     if worked is None:
         raise ParameterError(f"steps = {task.steps} is out of range; allowed: from 1 on")
     return worked

@@ -6,6 +6,7 @@ Everybody who plays machine k meets the same machine, demand and disturbance. Th
 comparison, demo and pictures.
 """
 
+import warnings
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from typing import Any, Protocol
@@ -199,7 +200,10 @@ def play(
     status = np.zeros(count, np.int64)
     runs = np.ones(count, np.bool_)
     for step in trange(steps, desc=progress, unit="step", disable=progress is None, leave=False):
-        observations, rewards, ended, _, info = envs.step(policy(observations))
+        actions = policy(observations)
+        with warnings.catch_warnings():
+            warnings.filterwarnings("ignore", "options .* held for the jobs")  # what begins after a job is not counted
+            observations, rewards, ended, _, info = envs.step(actions)
         kept["reward"][step, runs] = rewards[runs]
         for name in ("speed", "demand", "type_iii"):
             kept[name][step, runs] = info[name][runs]

@@ -8,15 +8,18 @@
 
 All starts run side by side in stages. One leaves as soon as it nears a known orbit and is ten times nearer to it than
 to any other, or moves on a known chaotic set. One whose section returns is handed to Newton's method, which proves a
-new orbit. One that is irregular for 256 cycles is diagnosed: chaotic and quasiperiodic motions are sets of states. What
-no test decides at the end of the budget is reported as unsettled.
+new orbit. One that is irregular for 256 cycles is diagnosed: chaotic and quasiperiodic motions are sets of states. Some
+starts on a set run on to the end of the budget; if one leaves it for an orbit, all do, since that chaos is transient.
+What no test decides at the end of the budget is reported as unsettled.
 
 Mapper, basin fractions and matching by distance are those of G. Datseris, K. Luiz Rossi and A. Wagemakers, Chaos 33
 (2023) 073151 (Attractors.jl).
 """
 
+import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
+from functools import partial
 from typing import Any
 
 import numpy as np
@@ -47,6 +50,9 @@ IRREGULAR = 256
 
 MOST_DIAGNOSES = 6
 """Of irregular starts in one search."""
+
+WATCHED = 6
+"""Starts on a set that run on to the end of the budget; if one leaves it, all do."""
 
 ARRIVED, APART = 1e-2, 0.1
 """Distance from an orbit at which a start has arrived, relative to the larger of orbit and box, and the largest ratio
@@ -205,7 +211,10 @@ class Attractors:
     @property
     def other_motions(self) -> tuple[str, ...]:
         """A phrase on every motion but the first, with its share of the starts."""
-        return tuple(f"{one.words}, {self._reached(one)}" for one in self.motions[1:])
+        lasts = f" for at least {self.budget} cycles"
+        return tuple(
+            f"{one.words}{'' if one.nature == 'periodic' else lasts}, {self._reached(one)}" for one in self.motions[1:]
+        )
 
     def told_of(self, verdict: MachineDiagnosis) -> MachineDiagnosis:
         """The verdict on the first motion, with the others and how far was looked."""
@@ -347,7 +356,7 @@ class Mapper:
     """Tells on which motion of a search a state settles; motions that are new are added behind the others."""
 
     def __init__(self, machine: Machine, found: Attractors, workers: int | None = None) -> None:
-        self._search = _Search(machine, found.box, found.budget, workers)
+        self._search = _Search(machine, found.box, found.budget, workers, watches=False)
         self._search.motions = list(found.motions)
 
     @property
@@ -378,13 +387,17 @@ class _Start:
 class _Search:
     """Motions met so far, and how starts are matched with them."""
 
-    def __init__(self, machine: Machine, box: StartBox, budget: int, workers: int | None) -> None:
+    def __init__(self, machine: Machine, box: StartBox, budget: int, workers: int | None, watches: bool = True) -> None:
+        self._watches = watches
         self._machine, self._budget, self._workers = machine, budget, workers
         with np.errstate(divide="ignore"):
-            self._weight = np.where(box.scale > 0.0, 1.0 / box.scale, 0.0) / np.sqrt(max(np.sum(box.scale > 0.0), 1))
+            self._weight = np.where(box.scale > 0.0, 1.0 / box.scale, 0.0) / math.sqrt(
+                max(np.count_nonzero(box.scale), 1)
+            )
         self.motions: list[Attractor] = []
         self._diagnoses = 0
         self._places: dict[int, int] = {}
+        self._on_sets: dict[int, list[_Start]] = {}
         self.lost: list[str | None] = []
         self.cycles = 0
 
@@ -412,10 +425,31 @@ class _Search:
             for number, (name, state) in enumerate(zip(names, states, strict=True))
         ]
         for stage in _stages(self._budget):
-            parallel_map(lambda start, until=stage: self._run(start, until), live, workers=self._workers)
+            parallel_map(partial(self._run, until=stage), live, workers=self._workers)
             self.lost += [start.name for start in live if start.record is None]
             live = self._matched([start for start in live if start.record is not None], stage)
         self.lost += [start.name for start in live]
+        for there in self._on_sets.values() if self._watches else ():
+            if self._leave(there[:WATCHED]):
+                self._leave(there[WATCHED:])
+
+    def _leave(self, there: list[_Start]) -> bool:
+        """Run starts on a set to the end of the budget; count those anew that leave it for an orbit, if any do."""
+        stage, left = self._budget, False
+        there = [start for start in there if start.cycles < stage]
+        parallel_map(partial(self._run, until=stage), there, workers=self._workers)
+        for start in there:
+            if start.record is None:
+                continue
+            self.cycles += len(start.record)
+            place = self._arrived(start)
+            if place is None:
+                place = self._added(self._proven(start, stage))
+            if place is not None:
+                self._count(start, self._places[start.number], -1)
+                self._count(start, place)
+                left = True
+        return left
 
     def _run(self, start: _Start, until: int) -> None:
         count = until - start.cycles
@@ -456,14 +490,18 @@ class _Search:
                 self._count(start, place)
         return waiting
 
-    def _count(self, start: _Start, place: int) -> None:
-        self._places[start.number] = place
+    def _count(self, start: _Start, place: int, change: int = 1) -> None:
+        """Count a start on a motion, or take it away."""
         motion = self.motions[place]
         if start.name is None:
-            motion = replace(motion, random_starts=motion.random_starts + 1)
+            motion = replace(motion, random_starts=motion.random_starts + change)
         else:
-            motion = replace(motion, from_starts=(*motion.from_starts, start.name))
+            others = tuple(name for name in motion.from_starts if name != start.name)
+            motion = replace(motion, from_starts=(*others, start.name) if change > 0 else others)
         self.motions[place] = motion
+        self._places[start.number] = place
+        if change > 0 and motion.period is None and not motion.neutral:
+            self._on_sets.setdefault(place, []).append(start)
 
     def _distances(self, states: Array) -> Array:
         """Smallest distance of each state (k, n) from each of the motions: (motions, k)."""

@@ -93,7 +93,7 @@ def smallest_shock(machine: Machine, found: Attractors, *, knocks: int = 384, wo
     sizes = np.geomspace(SMALLEST, 1.0, max(2, knocks // len(ways)))
     half = machine.n_velocities
     largest = [
-        float(found.box.reach * np.linalg.norm(found.box.scale[half : 2 * half]) / max(np.linalg.norm(row), 1e-300))
+        float(found.box.reach * np.linalg.norm(found.box.scale[half : 2 * half]) / (float(np.linalg.norm(row)) or 1.0))
         for row in rows
     ]
     mapper = Mapper(machine, found, workers)
@@ -150,12 +150,11 @@ def _unit_knocks(machine: Machine) -> list[Array]:
 def _knocked(machine: Machine, found: Attractors, rows: Sequence[Array], knock: Knock) -> Array | None:
     """State (n_states,) at the end of the cycle in which the first motion is knocked; None if it can't be followed."""
     row = rows[machine.joints.index(knock.joint) if machine.joints else 0]
-    half, state = machine.n_velocities, found.motions[0].state
-    if knock.phase:
-        state = _part(machine, state, 0.0, knock.phase)
-    if state is None:
+    half, begun = machine.n_velocities, found.motions[0].state
+    there = _part(machine, begun, 0.0, knock.phase) if knock.phase else begun
+    if there is None:
         return None
-    state = state.copy()
+    state = there.copy()
     state[half : 2 * half] += knock.velocity * row
     return _part(machine, state, knock.phase, 1.0 - knock.phase) if knock.phase else state
 

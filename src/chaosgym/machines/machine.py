@@ -128,7 +128,8 @@ class Machine(Abilities, ABC):
     @property
     def initial_state(self) -> tuple[float, ...]:
         """State from which it runs where no other is given (n_states,), in SI units; empty for rest."""
-        return self.__dict__.get("_initial_state", self.stated_state)
+        own: tuple[float, ...] = self.__dict__.get("_initial_state", self.stated_state)
+        return own
 
     def from_state(self, state: ArrayLike) -> Self:
         """Return the machine that runs from a state (n_states,) where no other is given; () for rest.

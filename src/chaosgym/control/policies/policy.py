@@ -178,6 +178,18 @@ class TrainedPolicy:
                 )
             self._memory = SpeedMemory(task, count, self.usual, learns=False)
 
+    def unusual(self, observations: Array) -> Array:
+        """How far the readings lie from what was usual in training, in standard deviations, (n, 3).
+
+        Raises
+        ------
+        ModelFileError
+            If the policy has no memory, or has not begun.
+        """
+        if self._memory is None:
+            raise ModelFileError(f"the policy of {self.env} does not know what is usual; allowed: one with a memory")
+        return self._memory.unusual(np.asarray(observations, float))
+
     def __call__(self, observations: Array) -> Array:
         """Return the actions (n,) or (n, 2) for observations (n, entries) of as many jobs as started.
 
