@@ -11,7 +11,7 @@ from scipy.signal import lfilter
 from chaosgym import default_classifier, judge_peaks
 from chaosgym.classifier import RecordAnswer
 from chaosgym.cli import app
-from chaosgym.diagnosis import Diagnosis
+from chaosgym.series import Diagnosis
 from tests.classifier.made_up import settled
 
 CYCLES = 200
