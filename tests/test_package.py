@@ -20,10 +20,9 @@ def _python(code):
 
 
 def test_import_is_light():
-    """Importing chaosgym registers the environments without loading numba, scipy, matplotlib or torch."""
-    loaded = _python(
-        "import sys, chaosgym; print([m for m in ('numba', 'scipy', 'matplotlib', 'torch') if m in sys.modules])"
-    )
+    """Importing chaosgym loads neither gymnasium nor numpy, numba, scipy, matplotlib or torch."""
+    heavy = ("gymnasium", "numpy", "numba", "scipy", "matplotlib", "torch")
+    loaded = _python(f"import sys, chaosgym; print([name for name in {heavy} if name in sys.modules])")
     assert loaded == "[]"
 
 
@@ -34,6 +33,40 @@ def test_simulating_imports_few_modules():
         "print(sum(name.partition('.')[0] == 'chaosgym' for name in sys.modules))"
     )
     assert int(_python(code).splitlines()[-1]) <= 45
+
+
+def _modules_of(*arguments):
+    """Modules that a command has loaded in the end."""
+    code = (
+        "import sys; from chaosgym.cli import app\n"
+        f"try: app({[*arguments]!r}, standalone_mode=False)\n"
+        "finally: print(); print(' '.join(sys.modules))"
+    )
+    return _python(code).splitlines()[-1].split()
+
+
+def test_judging_a_recording_loads_no_machine_and_no_compiler():
+    """What reads and judges a CSV, and no more: 40 modules of chaosgym at the most."""
+    loaded = _modules_of("judge", str(ROOT / "docs/data/peaks.csv"), "--column", "upper")
+    own = [name for name in loaded if name.partition(".")[0] == "chaosgym"]
+    assert "chaosgym.recordings.judge" in own
+    assert len(own) <= 40
+    assert {"numba", "gymnasium", "matplotlib", "chaosgym.core", "chaosgym.machines"}.isdisjoint(loaded)
+
+
+@pytest.mark.parametrize("command", ["judge", "judge-sweep", "run-up", "monitor"])
+def test_help_of_a_command_without_machine_imports_none(command):
+    """Options of machines are built where a machine is named."""
+    loaded = _modules_of(command, "--help")
+    assert [name for name in loaded if name.startswith(("chaosgym.machines", "chaosgym.core", "numba"))] == []
+
+
+def test_help_of_a_command_imports_no_machine_that_is_not_named():
+    """The names are in the registry; the options are those of the machine on the line."""
+    assert "chaosgym.machines.machine" not in _modules_of("diagnose", "--help")
+    loaded = _modules_of("diagnose", "impact-beam", "--help")
+    assert "chaosgym.machines.impact_beam" in loaded
+    assert "chaosgym.machines.slider_crank" not in loaded
 
 
 def test_classifying_needs_neither_torch_nor_scikit_learn():

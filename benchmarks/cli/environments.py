@@ -25,13 +25,25 @@ def judges(env: str, machines: int, speeds: int, as_json: bool) -> None:
 @click.command()
 @click.option("--machines", type=click.IntRange(2, 10_000), default=64, show_default=True)
 @click.option("--fleets", is_flag=True, help="Fleets of beams and cranks instead of beams with one thing changed.")
+@click.option("--row", "chosen", multiple=True, help="Name of a row; all by default; may be repeated.")
+@click.option(
+    "--kept",
+    type=click.Path(dir_okay=False, path_type=Path),
+    default="docs/data/mismatch.jsonl",
+    show_default=True,
+    help="Jobs that are done: they are not played again.",
+)
 @AS_JSON
-def mismatch(machines: int, fleets: bool, as_json: bool) -> None:
+def mismatch(machines: int, fleets: bool, chosen: tuple[str, ...], kept: Path, as_json: bool) -> None:
     """Play the shipped policies, guarded and not, on machines that differ from those of their training."""
     from benchmarks.envs.mismatch import FLEETS, ROWS, lines
     from benchmarks.envs.mismatch import mismatch as run
 
-    found = run(machines, FLEETS if fleets else ROWS)
+    rows = FLEETS if fleets else ROWS
+    for name in chosen:
+        if name not in rows:
+            raise click.UsageError(f"--row {name}: allowed: {'; '.join(rows)}")
+    found = run(machines, chosen or rows, kept)
     emit({"rows": found}, as_json, lambda: lines(found))
 
 

@@ -19,8 +19,8 @@ from typing import Any
 
 import click
 
-from chaosgym.cli import COMMANDS, app
-from chaosgym.cli.measured_options import Measured
+from chaosgym.cli import COMMANDS, app, former
+from chaosgym.cli.options import ALL, recording_options
 from chaosgym.files import write_atomically
 from chaosgym.machines import MACHINES
 
@@ -38,9 +38,13 @@ COMMON = """  --json                  Print one JSON object.
   --workers INTEGER       Threads; default: all processors."""
 """Options of several commands, which the list of commands explains."""
 
+OF_RECORDING = {
+    name for option in click.command()(recording_options(ALL)(lambda **_: None)).params for name in option.opts
+}
+
 SHARED = {
-    "show": ("of the machine", {"--set", "--fidelity", *(key for name in MACHINES for key in MACHINES[name].options)}),
-    "diagnose": ("of what was measured", {f"--{name.replace('_', '-')}" for name in Measured._fields}),
+    "show": ("of the machine", {"--set", "--fidelity"}),
+    "judge": ("of a recording", OF_RECORDING),
     "index": ("", {"--json", "--plot", "--workers"}),
 }
 """Options that several commands have: the page that lists them, what they are if many, and their names."""
@@ -58,9 +62,21 @@ def options(name: str) -> str:
     """Return the help of a command and of those below it, as a terminal of 100 columns shows it."""
     command = _command(name)
     texts = [_help(command, f"chaosgym {name}")]
+    texts += [_options_of(command, machine) for machine in sorted(MACHINES)] if name == "show" else []
     if isinstance(command, click.Group):
         texts += [_help(below, f"chaosgym {name} {inner}") for inner, below in sorted(command.commands.items())]
     return "\n\n".join(texts)
+
+
+def _options_of(command: click.Command, machine: str) -> str:
+    """The options that a machine adds to a command, as its help shows them."""
+    with command.make_context(f"chaosgym {command.name}", [machine], resilient_parsing=True) as context:
+        records = [parameter.get_help_record(context) for parameter in command.get_params(context)]
+    mark = f"[{machine}]"
+    formatter = click.HelpFormatter(width=100)
+    with formatter.section(f"Options of {machine}"):
+        formatter.write_dl([(name, "") for name, text in filter(None, records) if text.startswith(mark)])
+    return "\n".join(line.rstrip() for line in formatter.getvalue().strip().splitlines())
 
 
 def index() -> str:
@@ -85,6 +101,16 @@ def index() -> str:
             "Of several commands, whose pages name them:",
             "",
             f"```text\n{COMMON}\n```",
+            "",
+            "A machine has options of its own, see [show](show.md#options) and `chaosgym COMMAND MACHINE --help`.",
+            "",
+            "## Former spellings",
+            "",
+            "They work in this version, and a line on standard error says what to write. What they don't name stays.",
+            "",
+            "| former | write |",
+            "|---|---|",
+            *(f"| `{row.former}` | `{row.current}` |" for row in (*former.COMMANDS, *former.OPTIONS)),
             "",
         ]
     )

@@ -19,8 +19,8 @@ from typing import Any
 
 import numpy as np
 
-JUDGE_PEAKS = ("diagnose", "--peaks", "peaks.csv")
-JUDGE_SERIES = ("diagnose", "--series", "series.csv", "--column", "force", "--hz", "19")
+JUDGE_PEAKS = ("judge", "peaks.csv")
+JUDGE_SERIES = ("judge", "series.csv", "--column", "force", "--cycle", "19 Hz")
 CLEARANCE = ("diagnose", "impact-beam", "--clearance-mm", "0.1234567")
 CLEARANCE_MM = 0.1234567
 ENVIRONMENT = "chaosgym/ImpactBeamTolerance-v1"

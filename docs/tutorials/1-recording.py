@@ -96,6 +96,6 @@ plt.show()
 # One command does all of this and writes a page to hand on:
 #
 # ```bash
-# chaosgym design --peaks docs/data/peaks.csv --column upper --sensor-error "1 N" \
+# chaosgym judge docs/data/peaks.csv --column upper --sensor-error "1 N" \
 #     --load-rating "500 N" --out report.html
 # ```

@@ -4,13 +4,17 @@
     record = chaosgym.simulate(chaosgym.ImpactBeam(excitation_frequency=19.0), cycles=200, transient=200)
     chaosgym.two_step_test(record).nature
 
-Importing this package registers its Gymnasium environments and nothing else; the rest is loaded when it is used.
+Importing this package registers its Gymnasium environments, as soon as gymnasium is imported; the rest is loaded when
+it is used.
 """
 
+import sys
 from importlib import import_module
+from importlib.abc import MetaPathFinder
+from importlib.machinery import ModuleSpec
+from importlib.util import find_spec
 from typing import TYPE_CHECKING, Any
 
-import chaosgym.envs  # noqa: F401  (registers the environments)
 from chaosgym.version import __version__
 
 if TYPE_CHECKING:
@@ -100,6 +104,8 @@ __all__ = [
 
 
 def __getattr__(name: str) -> Any:
+    if name == "envs":
+        return import_module("chaosgym.envs")
     if name not in _MODULE_OF:
         raise AttributeError(f"module 'chaosgym' has no attribute {name!r}")
     return getattr(import_module(_MODULE_OF[name]), name)
@@ -107,3 +113,30 @@ def __getattr__(name: str) -> Any:
 
 def __dir__() -> list[str]:
     return sorted({*globals(), *_MODULE_OF})
+
+
+class _AfterGymnasium(MetaPathFinder):
+    """Registers the environments once gymnasium is imported: most commands need neither, and gymnasium takes long."""
+
+    def find_spec(self, fullname: str, path: Any, target: Any = None) -> ModuleSpec | None:
+        """Return the spec of gymnasium with a loader that registers the environments in the end."""
+        if fullname != "gymnasium":
+            return None
+        sys.meta_path.remove(self)
+        spec = find_spec(fullname)
+        if spec is None or spec.loader is None:
+            return spec
+        execute = spec.loader.exec_module
+
+        def execute_and_register(module: Any) -> None:
+            execute(module)
+            import_module("chaosgym.envs")
+
+        spec.loader.exec_module = execute_and_register  # type: ignore[method-assign]
+        return spec
+
+
+if "gymnasium" in sys.modules:
+    import_module("chaosgym.envs")
+else:
+    sys.meta_path.insert(0, _AfterGymnasium())

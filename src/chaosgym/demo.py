@@ -102,7 +102,7 @@ def run_demo(
     }
     jobs = {player: play(policy, ENVIRONMENT, range(MACHINES)) for player, policy in players.items()}
     worst = int(np.argmax(jobs[FOLLOWING].type_iii_share))
-    draw("agent", {player: play(players[player], ENVIRONMENT, [worst]) for player in (FOLLOWING, name)})
+    draw("agent", {player: jobs[player].job(worst) for player in (FOLLOWING, name)})
     result = {
         "points": {kind: _point_row(kind, record, sweep) for kind, record in records.items()},
         "sweep": {"points": len(sweep.table), "types": _shares(sweep)},

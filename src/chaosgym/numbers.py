@@ -1,9 +1,10 @@
-"""Validation of a machine's numbers from files, archives and programs: kind, shape, finiteness, range."""
+"""Numbers from files, archives and programs: validation of kind, shape, finiteness and range; a summary of many."""
 
 import reprlib
 from typing import Any
 
 import numpy as np
+from numpy.typing import ArrayLike
 
 from chaosgym.arrays import Array
 from chaosgym.errors import ParameterError
@@ -94,3 +95,16 @@ def _fits(there: int, wanted: int | None) -> bool:
 
 def _sides(shape: tuple[int, ...]) -> str:
     return " x ".join(map(str, shape)) or "no row of"
+
+
+def summary(values: ArrayLike) -> dict[str, float]:
+    """Smallest, largest, mean and standard deviation of readings, for people and JSON.
+
+    Examples
+    --------
+    >>> from chaosgym.numbers import summary
+    >>> summary([1.0, 2.0, 3.0])
+    {'min': 1.0, 'max': 3.0, 'mean': 2.0, 'std': 0.816496580927726}
+    """
+    readings = np.asarray(values, dtype=float)
+    return {name: float(getattr(readings, name)()) for name in ("min", "max", "mean", "std")}

@@ -167,7 +167,7 @@ def test_a_machine_of_ones_own_is_judged_by_proofs_and_by_its_forces():
     assert {(wild.plausible, wild.proven, wild.cycles) for wild in near} == {(("chaotic",), False, 128)}
     assert [wild.nature for wild in near].count("chaotic") >= 3
     assert general.classify(beam, budget_us=0.0, types=False).abstained
-    with pytest.raises(ModelFileError, match="diagnose --peaks"):
+    with pytest.raises(ModelFileError, match="chaosgym judge"):
         general.classify_record(np.ones(20))
     with pytest.raises(ModelFileError, match="from parameters alone"):
         general.classify_table(np.ones((2, 0)))

@@ -11,7 +11,7 @@ from scipy.signal import lfilter
 from chaosgym import default_classifier, judge_peaks
 from chaosgym.classifier import RecordAnswer
 from chaosgym.cli import app
-from chaosgym.diagnosis import Diagnosis
+from chaosgym.series import Diagnosis
 from tests.classifier.made_up import settled
 
 CYCLES = 200
@@ -44,10 +44,10 @@ def agrees(answer):
 
 
 def printed(peaks, tmp_path, *options):
-    """Text and JSON of ``classify``, and the JSON of ``diagnose``, on a record."""
+    """Text and JSON of ``classify``, and the JSON of ``judge``, on a record."""
     np.savetxt(tmp_path / "peaks.csv", peaks, header="peak [N]", comments="")
-    record = ("--peaks", str(tmp_path / "peaks.csv"), *options)
-    commands = (("classify", "impact-beam"), ("classify", "impact-beam", "--json"), ("diagnose", "--json"))
+    record = (str(tmp_path / "peaks.csv"), *options)
+    commands = (("classify", "impact-beam"), ("classify", "impact-beam", "--json"), ("judge", "--json"))
     text, answer, verdict = (CliRunner().invoke(app, [*words, *record]).stdout for words in commands)
     return text, json.loads(answer), json.loads(verdict)
 
@@ -69,7 +69,7 @@ def test_random_readings_are_never_called_chaotic(kind, error, seed):
 
 @pytest.mark.parametrize("options", [(), ("--sensor-error", "0.4 N")])
 def test_commands_say_the_same_of_a_random_record(tmp_path, options):
-    """``classify`` and ``diagnose`` call white noise of 6 % undetermined, in text and JSON, without a probability."""
+    """``classify`` and ``judge`` call white noise of 6 % undetermined, in text and JSON, without a probability."""
     text, answer, verdict = printed(random_record("white 6 %", 0), tmp_path, *options)
     assert answer["nature"] == verdict["nature"] == answer["verdict"]["nature"] == "undetermined"
     assert "chaotic  " not in text

@@ -20,7 +20,7 @@ DOCS = Path(__file__).parents[2] / "docs"
 SCHEMA = json.loads((DOCS / "answers.schema.json").read_text("utf-8"))
 
 BEAM = "chaosgym/ImpactBeamTolerance-v1"
-PEAKS = f'--peaks {DOCS}/data/peaks.csv --column upper --sensor-error "1 N"'
+PEAKS = f'{DOCS}/data/peaks.csv --column upper --sensor-error "1 N"'
 CRANK = f"{DOCS}/machines/compressor.toml"
 MAP = "sweep impact-beam --axis excitation_frequency=15:25:3 --axis clearance=0.12mm:0.13mm:3 --budget 200 --workers 1"
 BRIEF = """machine = "impact-beam"
@@ -58,23 +58,25 @@ QUICK = {
     "simulate": "impact-beam --cycles 3 --out p.csv --series-out s.csv --plot m.png; slider-crank --cycles 2",
     "show": f"impact-beam; {CRANK} --plot c.png",
     "new-machine": "; four-bar --out four-bar.toml",
-    "diagnose": f"impact-beam --frequency-hz 19 --types --step-check --margins --kicks 2; impact-beam;"
-    f"impact-beam --test two-step --budget 400; slider-crank --test mut; {PEAKS};"
-    f"--peaks {DOCS}/data/peaks.csv --column 'upper,lower';"
-    f'--sweep {DOCS}/data/sweep.csv --sensor-error "3 N"',
+    "diagnose": "impact-beam --frequency-hz 19 --types --margins --kicks 2; impact-beam;"
+    "impact-beam --test two-step --budget 400; slider-crank --test mut",
+    "judge": f"{PEAKS}; {DOCS}/data/peaks.csv --column 'upper,lower'; {PEAKS} --load-rating '500 N'",
+    "judge-sweep": f'{DOCS}/data/sweep.csv --sensor-error "3 N"',
+    "monitor": "",
     "overlay": f"impact-beam {PEAKS} --out o.png",
-    "classify": f"impact-beam --frequency-hz 19; impact-beam --budget-us 0; impact-beam {PEAKS}; impact-beam --follow",
+    "classify": f"impact-beam --frequency-hz 19; impact-beam --budget-us 0; impact-beam {PEAKS}",
     "sweep": MAP.removeprefix("sweep ") + " --out map --plot map.png",
     "dataset-info": "map",
     "dataset-map": "map --out map2.png",
-    "design": f'{PEAKS} --load-rating "500 N"; --template impact-beam',
+    "design": "--template impact-beam",
+    "tradeoff": "impact-beam --frequency-hz 19 --step-check",
     "run-agent": f"{BEAM} --machine 13 --load-rating 500; {BEAM} --machine 13; {BEAM} --plant docs.examples.rig:Rig",
     "info": "",
 }
 """Arguments of each command; several forms are divided by a semicolon, and run in this order in one folder."""
 
 LONG = {
-    "diagnose": f"impact-beam --frequency-hz 30 {PEAKS} --estimate clearance",
+    "fit": f"impact-beam --frequency-hz 30 {PEAKS} --estimate clearance",
     "branch": 'impact-beam --along "speed=17:18.2 Hz:5" --workers 1 --out o.csv;'
     'impact-beam --along "speed=17.3:17.7 Hz:3" --against "clearance=0.120mm:0.134mm:3" --workers 1',
     "tradeoff": "impact-beam --points 1 --cycles 20 --transient 20 --budget 0.05 --workers 1",
@@ -85,7 +87,7 @@ LONG = {
     "train-classifier": "--data demo/sweep --out learned",
 }
 
-APART = {"explore"}
+APART = {"explore", "run-up"}
 """Commands with a test of their own."""
 
 

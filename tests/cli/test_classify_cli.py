@@ -1,4 +1,4 @@
-"""``classify`` and ``train-classifier`` on the command line: parameters, measured records, batches, a live monitor."""
+"""``classify`` on the command line: parameters, measured records, batches."""
 
 import io
 import json
@@ -58,7 +58,10 @@ def run(*arguments, stdin="", machine="impact-beam"):
 def test_no_machine_is_one_line():
     """Without a word more, the command says which machines there are."""
     result = subprocess.run([sys.executable, "-m", "chaosgym", "classify"], capture_output=True, text=True)
-    assert (result.returncode, result.stderr) == (2, "Error: give a machine: impact-beam, slider-crank\n")
+    assert (result.returncode, result.stderr) == (
+        2,
+        "Error: Missing argument '{impact-beam|slider-crank|FILE.toml}'.\n",
+    )
 
 
 def lines_of(record):
@@ -68,7 +71,7 @@ def lines_of(record):
 
 def test_one_run_from_standard_input(model):
     """A chaotic record is called chaotic, with every key of the answer, and probabilities that sum to one."""
-    options = ("--peaks", "-", "--sensor-error", "1", "--model", model, "--json")
+    options = ("-", "--sensor-error", "1", "--model", model, "--json")
     code, out, _ = run(*options, stdin=lines_of(settled(3.9, 400)))
     assert code == 0
     answer = json.loads(out)
@@ -84,7 +87,7 @@ def test_one_run_a_column(model, tmp_path):
     rows = [f"{a},{b}" for a, b in zip(first, second, strict=False)] + [f"{a}," for a in first[20:]]
     path = tmp_path / "runs.csv"
     path.write_text("calm,wild\n" + "\n".join(rows) + "\n")
-    code, out, _ = run("--peaks", path, "--model", model, "--json")
+    code, out, _ = run(path, "--model", model, "--json")
     assert code == 0
     answers = json.loads(out)["runs"]
     assert (answers["calm"]["nature"], answers["calm"]["period"]) == ("periodic", 2)
@@ -94,7 +97,7 @@ def test_one_run_a_column(model, tmp_path):
 
 def test_a_fresh_process_answers_as_compiled_kernels_do(model):
     """One question to a new process, which compiles nothing, has the answer of the compiled kernels."""
-    for arguments, stdin in ((("--budget-us", "0"), ""), (("--peaks", "-"), lines_of(settled(3.2, 40)))):
+    for arguments, stdin in ((("--budget-us", "0"), ""), (("-",), lines_of(settled(3.2, 40)))):
         options = (*arguments, "--model", model, "--json")
         command = [sys.executable, "-m", "chaosgym", "classify", "impact-beam", *options]
         alone = subprocess.run(command, input=stdin, capture_output=True, text=True, check=True)
@@ -127,47 +130,6 @@ def test_a_budget_of_nothing_is_an_answer_from_parameters():
     answer = json.loads(run("--budget-us", "0", "--frequency-hz", "5", "--json")[1])
     assert (answer["stage"], answer["cycles"], answer["response_type"]) == ("parameters", 0, None)
     assert answer["nature"] == "periodic"
-
-
-def test_monitor_prints_a_line_each_cycle_and_logs_its_events(tmp_path):
-    """Regular at first, an alarm soon after chaos begins, and the event in the log."""
-    peaks = np.concatenate([settled(3.2, 40), settled(3.9, 20)])
-    log = tmp_path / "events.csv"
-    code, out, _ = run("--follow", "--sensor-error", "1", "--log", log, "--json", stdin=lines_of(peaks))
-    seen = [json.loads(line) for line in out.splitlines()]
-    assert code == 0
-    assert [one["cycle"] for one in seen] == list(range(1, 61))
-    assert [one["alarm"] for one in seen[32:40]] == [False] * 8
-    assert seen[-1]["alarm"]
-    (alarm,) = [one["cycle"] for one in seen if one["event"] == "alarm"]
-    assert 41 <= alarm <= 50
-    assert f"{alarm},alarm," in log.read_text()
-
-
-def test_a_watch_survives_what_is_no_reading():
-    """Text, NaN, a negative force and a column that is short are counted and warned of; the watch goes on."""
-    lines = [f"{k};{50.0 + 0.1 * (k % 3)}" for k in range(80)]
-    lines[40:44] = ["40;nan", "41;abc", "42;-3", "43"]
-    code, out, err = run("--follow", "--column", "2", "--json", stdin="\n".join(["cycle;F [N]", *lines]))
-    seen = [json.loads(line) for line in out.splitlines()]
-    assert code == 0
-    assert [one["event"] for one in seen if one["event"]] == ["missing"] * 4
-    assert seen[-1]["alarm"] is False
-    assert err.count("left out") == 4
-    code, _, err = run("--follow", stdin="100 N\n" * 300)
-    assert code == 2
-    assert "state --column" in err
-
-
-def test_monitor_answers_before_the_next_peak_comes():
-    """The verdict of a cycle is printed while standard input is still open."""
-    command = [sys.executable, "-m", "chaosgym", "classify", "impact-beam", "--follow", "--sensor-error", "1"]
-    with subprocess.Popen(command, stdin=subprocess.PIPE, stdout=subprocess.PIPE, text=True) as process:
-        for cycle, peak in enumerate(settled(3.2, 9), start=1):
-            process.stdin.write(f"{peak}\n")
-            process.stdin.flush()
-            assert process.stdout.readline().split()[0] == str(cycle)
-        process.stdin.close()
 
 
 def test_batch_keeps_the_columns_and_adds_the_answers(tmp_path):
@@ -233,7 +195,7 @@ def test_batch_of_records(model, tmp_path):
 )
 def test_bad_records_end_in_one_line(model, text, message):
     """No traceback, nothing on standard output, exit code 2."""
-    code, out, err = run("--peaks", "-", "--model", model, stdin=text)
+    code, out, err = run("-", "--model", model, stdin=text)
     assert (code, out) == (2, "")
     assert message in err
     assert len(err.strip().splitlines()) == 1
@@ -245,16 +207,13 @@ def test_bad_options_end_in_one_line(model, tmp_path):
     (tmp_path / "words.parquet").write_text("no parquet")
     out = ("--out", tmp_path / "out.parquet", "--model", model)
     for arguments, message in (
-        (("--peaks", "nowhere.csv"), "can't be read"),
-        (("--peaks", "-", "--follow"), "exclude each other"),
+        (("nowhere.csv",), "can't be read"),
+        (("-", "--batch", tmp_path / "in.parquet", *out), "FILE goes without --batch"),
         (("--batch", tmp_path / "in.parquet"), "belong together"),
         (("--batch", tmp_path / "in.parquet", *out), "no column excitation_frequency"),
         (("--batch", tmp_path / "words.parquet", *out), "can't be read as Parquet"),
-        (("--sensor-error", "3"), "belongs to --peaks, --series or --follow"),
-        (("--delimiter", ";"), "belongs to --follow"),
-        (("--follow", "--timeout-s", "0"), "out of range"),
-        (("--peaks", "-", "--budget-us", "9"), "belong to a machine"),
-        (("--log", "events.csv"), "belongs to --follow"),
+        (("--sensor-error", "3"), "options of a recording need one: classify impact-beam FILE"),
+        (("-", "--budget-us", "9"), "FILE goes without --batch"),
     ):
         code, shown, err = run(*arguments)
         assert (code, shown) == (2, "")
@@ -264,7 +223,7 @@ def test_bad_options_end_in_one_line(model, tmp_path):
 
 def test_wrong_units_are_suspected(model):
     """Peaks of 10^6 N are answered by an abstention that suspects the unit."""
-    code, out, _ = run("--peaks", "-", "--model", model, "--json", stdin=lines_of(1e6 * settled(3.9, 20) / 40.0))
+    code, out, _ = run("-", "--model", model, "--json", stdin=lines_of(1e6 * settled(3.9, 20) / 40.0))
     answer = json.loads(out)
     assert code == 0
     assert answer["abstained"]
@@ -277,7 +236,7 @@ def test_shipped_classifier_judges_a_simulated_record():
     for frequency, irregular in ((30.0, True), (19.0, False)):
         peaks = simulate(PLAIN_BEAM.at(frequency), 50, transient=200).peak_force[:, 0]
         noisy = peaks + np.random.default_rng(0).uniform(-3.0, 3.0, 50)
-        code, out, _ = run("--peaks", "-", "--sensor-error", "3", "--json", stdin=lines_of(noisy))
+        code, out, _ = run("-", "--sensor-error", "3", "--json", stdin=lines_of(noisy))
         assert code == 0
         answer = json.loads(out)
         assert answer["irregular"] is irregular

@@ -97,9 +97,9 @@ def test_damage_in_the_metadata_of_a_dataset_is_named(key, tmp_path):
     "arguments",
     [
         ("diagnose", "impact-beam", "--sensor-error", "inf"),
-        ("diagnose", "--peaks", "-", "--sensor-error", "nan"),
-        ("classify", "impact-beam", "--peaks", "-", "--sensor-error", "inf"),
-        ("design", "--peaks", "-", "--load-rating", "1000"),
+        ("judge", "-", "--sensor-error", "nan"),
+        ("classify", "impact-beam", "-", "--sensor-error", "inf"),
+        ("judge", "-", "--load-rating", "1000"),
     ],
 )
 def test_numbers_that_are_none_end_in_one_line(arguments, tmp_path):

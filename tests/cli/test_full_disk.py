@@ -20,11 +20,11 @@ WRITING = (
     "simulate impact-beam --cycles 300 --out p.parquet",
     "simulate impact-beam --cycles 3 --series-out s.csv",
     "new-machine --out a.toml",
-    f"diagnose {PEAKS} --plot d.pdf",
-    f"diagnose {PEAKS} --plot d.png",
+    f"judge {PEAKS} --plot d.pdf",
+    f"judge {PEAKS} --plot d.png",
     f"overlay impact-beam {PEAKS} --out o.png",
     f"{MAP} --out sweep",
-    f'design {PEAKS} --load-rating "500 N" --out r.html',
+    f'judge {PEAKS} --load-rating "500 N" --out r.html',
     f"run-agent {BEAM} --out j.gif",
     f'compare {BEAM} --machines 2 --only "follow the demand" --out s.parquet',
     "train-classifier --data ../made --out learned",
@@ -65,7 +65,7 @@ def limited():
 
 def test_a_picture_on_a_full_disk_is_one_line(tmp_path):
     """PDF, whose writer ends in an error of its own; nothing is left behind."""
-    told = ended(f"diagnose {PEAKS} --plot d.pdf", cwd=tmp_path, stdout=subprocess.DEVNULL, preexec_fn=limited)
+    told = ended(f"judge {PEAKS} --plot d.pdf", cwd=tmp_path, stdout=subprocess.DEVNULL, preexec_fn=limited)
     assert say_no_space(*told)
     assert os.listdir(tmp_path) == []
 
@@ -77,7 +77,7 @@ def test_every_command_ends_cleanly_on_a_full_disk_and_with_a_closed_output(tmp_
     for name, forms in (LONG | QUICK).items():
         words = name.replace("-", " ", 1) if name.startswith("dataset-") else name
         command = f"{words} {forms.split(';')[0]}"
-        if "brief" in command or "--follow" in command:
+        if "brief" in command or command == "monitor":
             continue
         with Path("/dev/full").open("wb") as full:
             assert say_no_space(*ended(command, cwd=tmp_path, stdout=full)), command

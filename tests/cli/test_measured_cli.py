@@ -1,4 +1,4 @@
-"""Measured signals on the command line: three commands, one reader, one answer; units and files for the next tool."""
+"""Measured signals on the command line: one reader, one answer; units and files for the next tool."""
 
 import json
 import re
@@ -15,7 +15,7 @@ from tests.cli.run import run
 from tests.plain_modes import HARD_BEAM
 from tests.recordings.records import KINDS, make
 
-COMMANDS = (("diagnose",), ("classify", "impact-beam"), ("design", "--load-rating", "0.5 kN"))
+COMMANDS = (("judge",), ("classify", "impact-beam"), ("judge", "--load-rating", "0.5 kN"))
 
 
 def written(record, path, style):
@@ -36,7 +36,7 @@ def written(record, path, style):
 
 
 def check_files(seeds, tmp_path):
-    """All three commands say the same nature and period of every file, and diagnose's reason is classify's."""
+    """All three commands say the same nature and period of every file, and a record's life changes nothing of it."""
     for number, (kind, seed) in enumerate((kind, seed) for seed in seeds for kind in KINDS if "simulated" not in kind):
         record = make(kind, 6000 + seed)
         path = tmp_path / f"{number}.txt"
@@ -44,7 +44,7 @@ def check_files(seeds, tmp_path):
         options = [f"--{name.replace('_', '-')}={value:.9g}" for name, value in record.stated.items()]
         told = []
         for command in COMMANDS:
-            code, out, err = run(*command, "--peaks", path, *options, "--json")
+            code, out, err = run(*command, path, "--as", "peaks", *options, "--json")
             if code == 2 and "cycles are too few for a statistic" in err:
                 continue
             assert code == 0, err
@@ -66,7 +66,7 @@ def test_three_commands_give_one_answer_on_a_hundred_files(tmp_path):
 
 
 def test_simulated_peaks_are_read_back(tmp_path):
-    """``simulate --out`` writes every cycle of both sides; ``diagnose``, ``classify`` and ``design`` read the file."""
+    """``simulate --out`` writes every cycle of both sides; ``judge`` and ``classify`` read the file."""
     for name in ("peaks.csv", "peaks.parquet"):
         path = tmp_path / name
         code, out, err = run(
@@ -84,14 +84,14 @@ def test_simulated_peaks_are_read_back(tmp_path):
         )
         assert code == 0, err
         peaks = json.loads(out)["surfaces_peak_force_N"]["upper"]
-        code, _, err = run("diagnose", "--peaks", path)
+        code, _, err = run("judge", path)
         assert code == 2
         assert "'upper', 'lower'; use --column NAME" in err
         for command in COMMANDS:
-            code, out, err = run(*command, "--peaks", path, "--column", "upper", "--json")
+            code, out, err = run(*command, path, "--column", "upper", "--json")
             assert code == 0, err
             assert json.loads(out)["period"] == 1
-        code, out, _ = run("diagnose", "--peaks", path, "--column", "upper", "--json")
+        code, out, _ = run("judge", path, "--column", "upper", "--json")
         assert json.loads(out)["peak_force_summary_N"]["max"] == max(peaks)
         assert run("simulate", "impact-beam", "--out", path)[0] == 2
 
@@ -101,12 +101,12 @@ def test_a_guessed_cycle_stands_in_the_headline(tmp_path):
     path = tmp_path / "series.csv"
     run("simulate", "impact-beam", "--frequency-hz", 19, "--cycles", 40, "--transient", 200, "--series-out", path)
     for command in COMMANDS:
-        code, out, err = run(*command, "--series", path, "--column", "force")
+        code, out, err = run(*command, path, "--column", "force")
         assert code == 0, err
         assert "periodic, period 1, if the cycle is 52.63 ms" in out
-    code, out, _ = run("diagnose", "--series", path, "--column", "force", "--json")
+    code, out, _ = run("judge", path, "--column", "force", "--json")
     assert json.loads(out)["condition"] == "if the cycle is 52.63 ms"
-    code, out, _ = run("diagnose", "--series", path, "--column", "force", "--hz", 19)
+    code, out, _ = run("judge", path, "--column", "force", "--cycle", "19 Hz")
     assert "if the cycle" not in out
 
 
@@ -115,28 +115,33 @@ def test_simulated_series_are_read_back(tmp_path):
     path = tmp_path / "series.parquet"
     run("simulate", "impact-beam", "--frequency-hz", 27.5, "--cycles", 300, "--transient", 200, "--series-out", path)
     assert len(pq.read_table(path)) == 300 * 256
-    for cycle in (("--hz", "27.5"), ("--rpm", "1650"), ("--period-s", "36.363636363636 ms")):
-        code, out, err = run("diagnose", "--series", path, *cycle, "--sensor-error", "1 N", "--json")
+    for cycle in ("27.5 Hz", "1650 rpm", "36.363636363636 ms"):
+        code, out, err = run("judge", path, "--cycle", cycle, "--sensor-error", "1 N", "--json")
         assert code == 0, err
         assert "random or chaotic, this record cannot tell" in json.loads(out)["reason"]
-    assert run("classify", "impact-beam", "--series", path, "--hz", 27.5)[0] == 0
-    assert run("design", "--load-rating", "500 N", "--series", path, "--hz", 27.5)[0] == 0
+    assert run("classify", "impact-beam", path, "--cycle", "27.5 Hz")[0] == 0
+    assert run("judge", "--load-rating", "500 N", path, "--cycle", "27.5 Hz")[0] == 0
 
 
 @pytest.mark.parametrize(
     ("arguments", "message"),
     [
-        (("diagnose", "--peaks", "-", "--sensor-error", "inf"), "is no finite number"),
-        (("diagnose", "--peaks", "-", "--sensor-error", "3 furlong"), "unknown unit 'furlong' (allowed: N, kN"),
-        (("diagnose", "--peaks", "-", "--sensor-error", "3 m"), "in m, the readings are in N"),
+        (("judge", "-", "--sensor-error", "inf"), "is no finite number"),
+        (("judge", "-", "--sensor-error", "3 furlong"), "unknown unit 'furlong' (allowed: N, kN"),
+        (("judge", "-", "--sensor-error", "3 m"), "in m, the readings are in N"),
         (("diagnose", "impact-beam", "--sensor-error", "inf"), "is no finite number"),
-        (("diagnose", "impact-beam", "--sensor-error", "3 m"), "the sensor's error is in m; allowed without a file"),
-        (("diagnose", "--peaks", "-", "--hz", "20"), "--hz belongs to --series"),
-        (("diagnose", "--peaks", "-", "--series", "-"), "exclude each other"),
-        (("diagnose", "--peaks", "-", "--sensor-error", "1", "--sensor-sigma", "1"), "given twice"),
-        (("diagnose", "--column", "upper"), "belong to a file that was measured"),
-        (("classify", "impact-beam", "--peaks", "-", "--sensor-error", "nan"), "is no finite number"),
-        (("diagnose", "--series", "-"), "no time column; use --rate-hz"),
+        (("diagnose", "impact-beam", "--sensor-error", "3 m"), "unknown unit 'm' (allowed: N, kN"),
+        (("judge", "-", "--cycle", "20"), "--cycle = '20' has no unit (allowed: Hz, kHz, rpm, s, ms"),
+        (
+            ("judge", "-", "--as", "peaks", "--cycle", "20 Hz"),
+            "a cycle of 0.05 s is stated, which one",
+        ),
+        (("judge", "-", "--tachometer", "1", "--cycle", "20 Hz"), "a tachometer and a cycle are stated"),
+        (("judge", "-", "--pulses-per-revolution", "2"), "allowed: with a tachometer"),
+        (("judge", "-", "--sensor-error", "1", "--sensor-sigma", "1"), "given twice"),
+        (("classify", "impact-beam", "-", "--sensor-error", "nan"), "is no finite number"),
+        (("judge", "-", "--as", "series"), "no time column; use --rate-hz"),
+        (("diagnose", "impact-beam", "--test", "mut", "--types"), "go with --test adaptive, not with mut"),
         (
             ("simulate", "impact-beam", "--clearance-mm", "0.1 furlong"),
             "unknown unit 'furlong' (allowed: m, mm, um, in)",
@@ -158,7 +163,7 @@ def test_wrong_options_end_in_one_line(arguments, message):
 def test_extreme_peaks_end_in_one_line_or_a_plain_answer(value):
     """1e308 N and 1e-320 N are refused by all; all zeros are no contact."""
     for command in COMMANDS:
-        code, out, err = run(*command, "--peaks", "-", stdin=f"{value}\n" * 60)
+        code, out, err = run(*command, "-", stdin=f"{value}\n" * 60)
         assert (code == 2 and len(err.strip().splitlines()) == 1) or "no contact" in out
         assert value == "0" or "is no force in newton" in err or "allowed: 0, or 1e-100 N and more" in err
 
@@ -198,22 +203,16 @@ def test_commands_of_the_documentation_run(tmp_path, monkeypatch):
     root = Path(__file__).parent.parent.parent
     page = (root / "docs" / "recordings.md").read_text()
     commands = [shlex.split(line)[1:] for line in re.findall(r"^    (chaosgym .*)$", page, re.MULTILINE)]
-    assert [command[0] for command in commands] == [
-        "diagnose",
-        "classify",
-        "design",
-        "simulate",
-        "diagnose",
-        "diagnose",
-    ]
+    assert [command[0] for command in commands] == ["judge", "classify", "judge", "simulate", "judge", "fit"]
     monkeypatch.chdir(tmp_path)
     (tmp_path / "docs" / "data").mkdir(parents=True)
+    for name in ("periodic.csv", "peaks.csv"):
+        (tmp_path / "docs" / "data" / name).write_bytes((root / "docs" / "data" / name).read_bytes())
     sample = tmp_path / "docs" / "data" / "peaks.csv"
-    sample.write_bytes((root / "docs" / "data" / "peaks.csv").read_bytes())
     for command in commands[:3]:
         code, out, err = run(*command)
         assert code == 0, err
-        assert "random or chaotic, this record cannot tell" in out
+        assert "periodic, period 1" in out
     assert (tmp_path / "report.html").is_file()
     assert "together: random or chaotic, these sensors cannot tell" in run(*commands[4])[1]
     told = re.search(r"agree; without noise their machines are chaotic (\d+)", run(*commands[5])[1])
@@ -231,7 +230,7 @@ def test_both_surfaces_tell_what_neither_tells_alone(tmp_path):
     peaks *= 1.0 + 1e-3 * np.random.default_rng(0).normal(size=peaks.shape)
     path = tmp_path / "both.csv"
     np.savetxt(path, peaks, "%.4f", ",", header="upper,lower", comments="")
-    out = run("diagnose", "--peaks", path, "--column", "upper,lower", "--sensor-error", "1 N")[1]
+    out = run("judge", path, "--column", "upper,lower", "--sensor-error", "1 N")[1]
     assert "together  chaotic" in out
     assert out.count("undetermined") == 2
 
@@ -262,7 +261,7 @@ def test_a_design_tells_its_source_and_no_examples(tmp_path):
     """Without a strength there is no reliability; the file, its hash and the date are in the report."""
     path, page = tmp_path / "peaks.csv", tmp_path / "report.html"
     path.write_text("cycle,peak [N]\n" + "".join(f"{k},{50 + k % 2}\n" for k in range(60)))
-    code, out, err = run("design", "--peaks", path, "--load-rating", "500", "--out", page)
+    code, out, err = run("judge", path, "--load-rating", "500", "--out", page)
     assert code == 0, err
     assert out.startswith("periodic, period 2: every cycle loads the surface alike")
     assert "no reliability" in out
@@ -274,7 +273,7 @@ def test_a_design_tells_its_source_and_no_examples(tmp_path):
     assert "Reliability over" not in page.read_text()
     assert "GPa" not in page.read_text()
     path.write_text("cycle,peak [N]\n" + "".join(f"{k},{50 + k % 2}\n" for k in range(6)))
-    code, _, err = run("design", "--peaks", path, "--load-rating", "500")
+    code, _, err = run("judge", path, "--load-rating", "500")
     assert code == 2
     assert "8 or more" in err
 
@@ -284,7 +283,7 @@ SWEEP = Path(__file__).parents[2] / "docs" / "data" / "sweep.csv"
 
 def test_a_measured_sweep_is_told_by_types(tmp_path):
     """The documentation's sweep: rises to 7 Hz, fluctuates, irregular from 22 Hz on; a picture of it."""
-    code, out, _ = run("diagnose", "--sweep", SWEEP, "--sensor-error", "3 N", "--plot", tmp_path / "s.png", "--json")
+    code, out, _ = run("judge-sweep", SWEEP, "--sensor-error", "3 N", "--plot", tmp_path / "s.png", "--json")
     assert code == 0
     told = json.loads(out)
     assert [(one["type"], one["first"], one["last"]) for one in told["regions"]] == [
@@ -294,7 +293,7 @@ def test_a_measured_sweep_is_told_by_types(tmp_path):
     ]
     assert (told["speed_column"], told["speed_unit"], len(told["speeds"])) == ("frequency", "Hz", 27)
     assert (tmp_path / "s.png").stat().st_size > 10_000
-    code, out, _ = run("diagnose", "--sweep", SWEEP, "--sensor-sigma", "1.73 N")
+    code, out, _ = run("judge-sweep", SWEEP, "--sensor-sigma", "1.73 N")
     assert code == 0
     assert "Type III  29 to 30 Hz" in out
 
@@ -311,27 +310,16 @@ def test_a_measured_sweep_is_told_by_types(tmp_path):
         ("speed,peak\n1,-2\n1,3\n", ("--sensor-error", "3 N"), "is a negative force"),
         ("speed [Hz]\n1\n2\n", ("--sensor-error", "3 N"), "--column NAME"),
         ("", ("--sensor-error", "3 N"), "holds no numbers"),
-        ("speed,peak\n1,2\n", ("--peaks", "x.csv"), "--sweep goes alone"),
-        ("speed,peak\n1,2\n", ("--types",), "--sweep goes alone"),
-        ("speed,peak\n1,2\n", ("--step-check",), "--sweep goes alone"),
-        ("speed,peak\n1,2\n", ("--test", "mut"), "--sweep goes alone"),
     ],
 )
 def test_a_sweep_that_is_none_is_refused_in_one_line(tmp_path, text, options, message):
     """Exit code 2, and what to do."""
     path = tmp_path / "sweep.csv"
     path.write_text(text)
-    code, out, err = run("diagnose", "--sweep", path, *options)
+    code, out, err = run("judge-sweep", path, *options)
     assert (code, out) == (2, "")
     assert message in err
     assert err.rstrip().splitlines()[-1].startswith("Error: ")
-
-
-def test_a_speed_column_belongs_to_a_sweep():
-    """Alone it would do nothing."""
-    code, _, err = run("diagnose", "impact-beam", "--speed-column", "x")
-    assert code == 2
-    assert "--speed-column belongs to --sweep" in err
 
 
 def test_an_acceleration_is_judged_in_its_own_unit(tmp_path):
@@ -339,24 +327,24 @@ def test_an_acceleration_is_judged_in_its_own_unit(tmp_path):
     path = tmp_path / "peaks.csv"
     rng = np.random.default_rng(0)
     path.write_text("Acc [g]\n" + "".join(f"{a:.5f}\n" for a in 3.0 + 0.01 * rng.normal(size=200)))
-    code, out, _ = run("diagnose", "--peaks", path, "--sensor-error", "0.05 g")
+    code, out, _ = run("judge", path, "--sensor-error", "0.05 g")
     assert code == 0
     assert "periodic, period 1" in out
     assert " N" not in out
-    told = json.loads(run("diagnose", "--peaks", path, "--json")[1])
+    told = json.loads(run("judge", path, "--json")[1])
     assert told["unit"] == "g"
     assert told["peak_summary"]["mean"] == pytest.approx(3.0, rel=0.01)
-    code, _, err = run("diagnose", "--peaks", path, "--sensor-error", "0.05 mV")
+    code, _, err = run("judge", path, "--sensor-error", "0.05 mV")
     assert code == 2
     assert "in mV, the readings are in g" in err
-    code, _, err = run("design", "--peaks", path, "--load-rating", "500 N")
+    code, _, err = run("judge", path, "--load-rating", "500 N")
     assert code == 2
     assert "asks for a force; state --scale" in err
-    assert run("design", "--peaks", path, "--load-rating", "500 N", "--scale", "0.02 g/N")[0] == 0
-    code, out, _ = run("diagnose", "--peaks", path, "--scale", "0.02 g/N")
+    assert run("judge", path, "--load-rating", "500 N", "--scale", "0.02 g/N")[0] == 0
+    code, out, _ = run("judge", path, "--scale", "0.02 g/N")
     assert code == 0
     assert "mean 150.0" in out
-    assert run("diagnose", "--peaks", path, "--plot", tmp_path / "g.png")[0] == 0
+    assert run("judge", path, "--plot", tmp_path / "g.png")[0] == 0
 
 
 @pytest.fixture
@@ -375,17 +363,20 @@ def recordings(tmp_path):
 def test_columns_are_named_by_patterns_lists_and_numbers(recordings):
     """Every way to name both columns gives a line each and one together; one column gives the full answer."""
     for column in ("front,rear", "*", "1,2", "re*,FRONT", "front, front ,2"):
-        code, out, _ = run("diagnose", "--peaks", recordings / "a.csv", "--column", column, "--json")
+        code, out, _ = run("judge", recordings / "a.csv", "--column", column, "--json")
         told = json.loads(out)
         assert code == 0
         assert {one["column"] for one in told["recordings"]} == {"front", "rear"}
         assert [(one["nature"], one["period"]) for one in told["together"]] == [("periodic", 2)]
-    code, out, _ = run("diagnose", "--peaks", recordings / "a.csv", "--column", "re*", "--json")
+    code, out, _ = run("judge", recordings / "a.csv", "--column", "re*", "--json")
     assert (code, json.loads(out)["column"]) == (0, "rear")
-    code, _, err = run("diagnose", "--peaks", recordings / "a.csv", "--column", "front,side*")
+    code, _, err = run("judge", recordings / "a.csv", "--column", "front,side*")
     assert (code, err.count("\n")) == (2, 1)
     assert "has no column 'side*'; its columns of numbers: 'front', 'rear'" in err
-    code, _, err = run("design", "--peaks", recordings / "a.csv", "--column", "*", "--load-rating", "500 N")
+    code, _, err = run("fit", "impact-beam", recordings / "a.csv", "--column", "*")
+    assert (code, err.count("\n")) == (2, 1)
+    assert "columns 'front', 'rear' are compared with surfaces of impact-beam; allowed: upper, lower" in err
+    code, _, err = run("judge", recordings / "a.csv", "--column", "*", "--load-rating", "500 N")
     assert (code, err.count("\n")) == (2, 1)
     assert "--column '*' means 'front', 'rear'; allowed here: one column" in err
 
@@ -393,7 +384,7 @@ def test_columns_are_named_by_patterns_lists_and_numbers(recordings):
 def test_a_folder_or_a_pattern_gives_a_table(recordings):
     """A line for every channel of every file, in its own unit; a file that can't be judged says why."""
     picture = recordings.parent / "page.png"
-    code, out, _ = run("diagnose", "--peaks", recordings, "--plot", picture)
+    code, out, _ = run("judge", recordings, "--plot", picture)
     assert code == 0
     assert picture.stat().st_size > 10_000
     rows = out.splitlines()
@@ -401,12 +392,12 @@ def test_a_folder_or_a_pattern_gives_a_table(recordings):
     channels = [("a.csv", "front"), ("a.csv", "rear"), ("a.csv", "together"), ("b.csv", "acc"), ("notes.txt", "not")]
     assert [tuple(row.split()[:2]) for row in rows[1:6]] == channels
     assert "notes.txt holds no numbers" in out
-    code, out, _ = run("diagnose", "--peaks", recordings / "[ab].csv", "--json")
+    code, out, _ = run("judge", recordings / "[ab].csv", "--json")
     told = json.loads(out)
     assert (code, told["not_judged"]) == (0, [])
     assert [one["unit"] for one in told["recordings"]] == ["N", "N", "g"]
     for source, message in ((recordings / "c*.csv", "holds no file"), (recordings / "notes*", "holds no numbers")):
-        code, _, err = run("diagnose", "--peaks", source)
+        code, _, err = run("judge", source)
         assert (code, err.count("\n")) == (2, 1)
         assert message in err
 
@@ -417,31 +408,28 @@ PEAKS = Path(__file__).parents[2] / "docs" / "data" / "peaks.csv"
 @pytest.mark.parametrize(
     ("arguments", "message"),
     [
-        (["--peaks", PEAKS, "--column", "upper", "--estimate", "clearance"], "--estimate needs a machine"),
-        (["impact-beam", "--estimate", "clearance"], "--estimate needs a machine and what was measured"),
-        (["impact-beam", "--peaks", PEAKS, "--column", "upper", "--estimate", "hue"], "'hue' can't be estimated"),
-        (["impact-beam", "--peaks", PEAKS, "--column", "upper", "--types"], "go without --test, --types"),
-        (["impact-beam", "--peaks", PEAKS, "--column", "upper", "--sensor-sigma", "-1"], "out of range"),
+        (["impact-beam", PEAKS, "--column", "upper", "--estimate", "hue"], "'hue' can't be estimated"),
+        (["impact-beam", PEAKS, "--column", "upper", "--sensor-sigma", "-1"], "out of range"),
     ],
 )
 def test_a_record_beside_a_machine_is_refused_in_one_line(arguments, message):
     """What does not go together, and what is no parameter."""
-    code, _, err = run("diagnose", *arguments)
+    code, _, err = run("fit", *arguments)
     assert (code, err.count("\n")) == (2, 1)
     assert message in err
 
 
 def test_a_recording_that_takes_long_shows_a_sign_of_life(tmp_path, monkeypatch):
     """The reader says after a while that it goes on."""
-    from chaosgym.recordings import read
+    from chaosgym.recordings import runs
 
-    def slow(source, found=read.read_recording, **where):
+    def slow(source, found=runs.read_recording, **where):
         time.sleep(1.0)
         return found(source, **where)
 
     monkeypatch.setattr("chaosgym.cli.output.PATIENCE_SECONDS", 0.01)
-    monkeypatch.setattr(read, "read_recording", slow)
+    monkeypatch.setattr(runs, "read_recording", slow)
     np.savetxt(tmp_path / "peaks.csv", 10.0 + np.sin(np.arange(40.0)))
-    code, _, err = run("diagnose", "--peaks", tmp_path / "peaks.csv", "--sensor-error", "1 N")
+    code, _, err = run("judge", tmp_path / "peaks.csv", "--sensor-error", "1 N")
     assert code == 0
     assert "read and judge the recording: " in err

@@ -51,9 +51,9 @@ def peaks(here):
         ("simulate", "impact-beam", "--clearance-mm", 100, "--cycles", 1),
         ("diagnose", "impact-beam", "--frequency-hz", 19),
         ("diagnose", "impact-beam", "--frequency-hz", 30, "--budget", 100),
-        ("diagnose", "--peaks", "peaks.csv", "--column", "calm", "--sensor-error", 1),
-        ("classify", "impact-beam", "--peaks", "peaks.csv", "--sensor-error", 1),
-        ("design", "--peaks", "peaks.csv", "--column", "wild", "--load-rating", 500),
+        ("judge", "peaks.csv", "--column", "calm", "--sensor-error", 1),
+        ("classify", "impact-beam", "peaks.csv", "--sensor-error", 1),
+        ("judge", "peaks.csv", "--column", "wild", "--load-rating", 500),
     ],
 )
 def test_a_picture_is_drawn_into_a_new_file(command, peaks):
@@ -89,7 +89,7 @@ def test_an_agent_is_drawn(folder):
         (("simulate", "--plot", "impact-beam"), "Missing argument"),
         (("simulate", "impact-beam", "--plot", "x.doc"), "allowed: names that end in .png, .svg, .pdf"),
         (("simulate", "impact-beam", "--plot", "nowhere/x.png"), "nowhere is no folder"),
-        (("classify", "impact-beam", "--plot"), "--plot goes with --peaks"),
+        (("classify", "impact-beam", "--plot"), "need one: classify impact-beam FILE"),
         (("design", "brief.toml", "--plot", "x.doc"), "allowed: names that end in .png, .svg, .pdf"),
     ],
 )

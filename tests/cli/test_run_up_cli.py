@@ -1,4 +1,4 @@
-"""``diagnose --run-up`` on the command line."""
+"""``run-up`` on the command line."""
 
 import json
 import re
@@ -32,7 +32,7 @@ OF_FILE = ("--column", "bearing", "--tachometer", "tacho", "--pulses-per-revolut
 def test_a_run_up_is_told_in_lines_in_json_and_as_a_picture(recording, tmp_path):
     """Turns, the missed pulse, both orders in g, and the types of two alternating levels: one answer in three forms."""
     picture = tmp_path / "run.png"
-    of_run = ("diagnose", "--series", recording, *OF_FILE, "--run-up", "--sensor-error", "0.05 g")
+    of_run = ("run-up", recording, *OF_FILE, "--sensor-error", "0.05 g")
     code, out, err = run(*of_run, "--plot", picture)
     assert code == 0, err
     assert "order 1      up to 2 g at" in out
@@ -40,7 +40,7 @@ def test_a_run_up_is_told_in_lines_in_json_and_as_a_picture(recording, tmp_path)
     assert "pulses mended: 1 missed" in out
     assert picture.stat().st_size > 10_000
     code, out, _ = run(*of_run, "--json")
-    check("diagnose", out)
+    check("run-up", out)
     told = json.loads(out)
     assert told["turns"] == pytest.approx(ANGLE[-1], abs=0.6)
     assert (told["missed_pulses"], told["unit"]) == (1, "g")
@@ -48,8 +48,8 @@ def test_a_run_up_is_told_in_lines_in_json_and_as_a_picture(recording, tmp_path)
 
 
 def test_a_tachometer_of_several_pulses_cuts_the_cycles_of_other_commands(recording):
-    """Without --run-up the turns are judged as cycles: 449 of them, not four times as many."""
-    code, out, err = run("diagnose", "--series", recording, *OF_FILE, "--sensor-error", "0.05 g", "--json")
+    """``judge`` takes the turns for cycles: 449 of them, not four times as many."""
+    code, out, err = run("judge", recording, *OF_FILE, "--sensor-error", "0.05 g", "--json")
     assert code == 0, err
     assert any("448 cycles" in note or "449 cycles" in note for note in json.loads(out)["warnings"])
 
@@ -57,8 +57,7 @@ def test_a_tachometer_of_several_pulses_cuts_the_cycles_of_other_commands(record
 def test_a_tachometer_may_be_named_by_its_number(recording):
     """As any other column."""
     by_name, by_number = (
-        run("diagnose", "--series", recording, "--run-up", *OF_FILE, "--tachometer", name, "--json")[1]
-        for name in ("tacho", "3")
+        run("run-up", recording, *OF_FILE, "--tachometer", name, "--json")[1] for name in ("tacho", "3")
     )
     assert by_name
     assert by_number == by_name
@@ -67,23 +66,21 @@ def test_a_tachometer_may_be_named_by_its_number(recording):
 @pytest.mark.parametrize(
     ("options", "why"),
     [
-        (("--run-up",), "--run-up needs --series FILE --tachometer NAME"),
-        (("--run-up", "--tachometer", "bearing", "--column", "bearing"), "can't be both tachometer and signal"),
+        ((), "a run-up needs a tachometer; state --tachometer NAME"),
+        (("--tachometer", "bearing", "--column", "bearing"), "can't be both tachometer and signal"),
         (
-            ("--run-up", "--column", "bearing", "--tachometer", "speed"),
+            ("--column", "bearing", "--tachometer", "speed"),
             "'speed'; its columns of numbers: ",
         ),
-        (("--run-up", *OF_FILE, "--orders", "nan"), "Invalid value for '--orders': 'nan' is no number"),
-        (("--run-up", *OF_FILE[:-1], "400"), "turns, 400 pulses each; needed: 12 turns or more"),
-        (("--run-up", *OF_FILE, "--orders", "300"), "order 300 at .* allowed: up to order"),
-        (("--pulses-per-revolution", "4"), "--pulses-per-revolution belongs to --tachometer"),
-        (("--orders", "4"), "--orders belongs to --run-up"),
-        (("--run-up", *OF_FILE, "--types"), "--run-up goes without a machine"),
+        ((*OF_FILE, "--orders", "nan"), "Invalid value for '--orders': 'nan' is no number"),
+        ((*OF_FILE[:-1], "400"), "turns, 400 pulses each; needed: 12 turns or more"),
+        ((*OF_FILE, "--orders", "300"), "order 300 at .* allowed: up to order"),
+        (("--pulses-per-revolution", "4"), "allowed: with a tachometer"),
     ],
 )
 def test_what_is_no_run_up_is_refused_in_one_line(recording, options, why):
     """Each says what to do."""
-    code, out, err = run("diagnose", "--series", recording, *options)
+    code, out, err = run("run-up", recording, *options)
     assert (code != 0, out) == (True, "")
     assert re.search(why, err)
     assert len(err.strip().splitlines()) <= 3

@@ -148,3 +148,27 @@ def test_a_common_schedule_is_the_same_for_all_machines(own):
     envs.reset(seed=[3, 3], options={"machine": np.array([1, 2])})
     controller.start(envs)
     assert np.array_equal(controller._plan[:, 0], controller._plan[:, 1])
+
+
+def test_no_controller_stays_where_the_force_is_larger():
+    """Backing off an irregular demand into a resonance, twice the force, it goes back; a task may allow any force."""
+
+    class Away(BackOff):
+        def speeds(self, observations):
+            """One above the demand."""
+            return observations[:, PLACE.demand] + 1.0
+
+    def jobs(force, **weights):
+        envs = native_envs(BEAM, 1, action="speed", **weights)
+        envs.reset(seed=3)
+        rule, asked = Away(), []
+        rule.start(envs)
+        for speed, peak in ((20.0, 80.0), (21.0, force), (20.0, 80.0)):
+            observation = np.zeros((1, 14), np.float32)
+            observation[0, [PLACE.speed, PLACE.demand, PLACE.mean_peak_force]] = speed, 20.0, peak
+            asked.append(float(rule(observation)[0, 0]))
+        return asked
+
+    assert jobs(160.0) == [21.0, 20.0, 20.0]
+    assert jobs(100.0) == [21.0, 21.0, 21.0]
+    assert jobs(160.0, damage_weight=0.0) == [21.0, 21.0, 21.0]

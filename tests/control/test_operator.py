@@ -67,9 +67,9 @@ def test_it_runs_for_longer_than_a_job():
 @pytest.mark.parametrize(
     ("peaks", "readings", "complaint"),
     [
-        ([80.0] * 4, {}, r"peaks of shape \(4,\) are not usable; allowed: 5 or more finite forces"),
+        ([80.0] * 4, {}, r"peaks of shape \(4,\) are not usable; allowed: 5 or more forces"),
         ("loud", {}, "peaks = 'loud' are no numbers; allowed: 5 or more forces"),
-        ([80.0, np.nan] * 5, {}, "finite forces from 0 N on"),
+        ([80.0, np.nan, -1.0] * 5, {}, "5 or more forces from 0 N on"),
         ([80.0] * 10, {"demand": 99.0}, "demand = 99.0 is out of range; allowed: 10 to 24"),
         ([80.0] * 10, {"bouncing": 2.0}, "bouncing = 2.0 is out of range; allowed: 0 to 1"),
     ],
@@ -93,3 +93,60 @@ def test_what_a_policy_needs_is_asked_for():
         operator.next([80.0] * 10)
     with pytest.raises(ModelFileError, match="was trained on"):
         chaosgym.Operator(shipped_policy(BEAM), "chaosgym/SliderCrank-v1").start(speed=200.0, demand=200.0)
+
+
+@pytest.mark.parametrize("policy", [BackOff(), Kriging(), shipped_policy(BEAM), lambda observation: [20.0]])
+def test_what_is_no_reading_is_skipped(policy):
+    """A step without a reading keeps the trim; the third one in a row, and a new demand, go to the demand."""
+    keywords = {} if hasattr(policy, "start") else {"action": "speed"}
+    operator = chaosgym.Operator(policy, BEAM, **keywords)
+    operator.start(speed=20.0, demand=20.0)
+    seen = {"impacts": 12.0, "bouncing": 0.6}
+    loud = np.tile([60.0, 90.0, 75.0], 4)
+    for _ in range(21):
+        trim = operator.next(loud, **seen) - operator.demand
+    lost = [[np.nan] * 10, [80.0, np.nan] * 5, [1e9] * 10, [0.0] * 10]
+    speeds = [operator.next(peaks, **seen) for peaks in lost[:2]]
+    assert speeds == [operator.demand + trim] * 2
+    with pytest.warns(UserWarning, match=r"no usable reading for 3 steps \(mean peak force 475 N\)"):
+        assert operator.next(lost[2], **seen) == operator.demand
+    assert operator.next(lost[3], **seen) == operator.demand
+    assert operator.lost == 4
+    assert operator.next(loud, **seen | {"impacts": np.nan}, demand=22.0) == 22.0
+    assert np.isfinite(operator.next(loud, **seen))
+    assert operator.lost == 5
+
+
+def test_the_longest_stretch_of_finite_peaks_is_the_reading():
+    """Cycles on both sides of a lost one are not compared: eight that repeat after two cycles look the same alone."""
+    operators = [chaosgym.Operator(BackOff(), BEAM) for _ in range(2)]
+    for operator in operators:
+        operator.start(speed=20.0, demand=20.0)
+    alone = [80.0, 95.0] * 4
+    assert operators[0].next(alone) == operators[1].next([70.0, np.nan, *alone, np.inf, 70.0])
+    for name, values in operators[0].policy.__dict__.items():
+        if isinstance(values, np.ndarray):
+            np.testing.assert_array_equal(values, getattr(operators[1].policy, name))
+
+
+def test_the_measured_speed_is_what_a_policy_sees():
+    """A drive that stands at 19 Hz: kriging remembers forces at 19 Hz, and set-points go on from the last one."""
+    operator = chaosgym.Operator(Kriging(), BEAM)
+    operator.start(speed=19.0, demand=22.0)
+    speeds = [operator.next([80.0] * 10, speed=19.0) for _ in range(4)]
+    grid = operator.task.grid
+    assert grid[np.flatnonzero(operator.policy._counts[0])].tolist() == [19.0]
+    assert np.abs(np.diff([19.0, *speeds])).max() <= operator.task.slew_limit
+    assert max(speeds) > 21.0
+
+
+def test_speeds_stay_within_the_drive():
+    """Whatever a policy asks for: range of speed and change in a step are those of the task."""
+    random = np.random.default_rng(5)
+    operator = chaosgym.Operator(lambda observation: [random.choice([-1e9, 5.0, 30.0, 1e9])], BEAM, action="speed")
+    operator.start(speed=20.0, demand=22.0)
+    with pytest.warns(UserWarning, match="actions outside the box are clipped; allowed with action='speed': 10 to 24"):
+        speeds = [20.0, *(operator.next([80.0] * 10, impacts=9.0, bouncing=0.5) for _ in range(60))]
+    task = operator.task
+    assert task.lowest_speed == min(speeds) < max(speeds) == task.highest_speed
+    assert np.abs(np.diff(speeds)).max() <= task.slew_limit

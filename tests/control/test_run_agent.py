@@ -7,9 +7,18 @@ import numpy as np
 import pytest
 from PIL import Image
 
+from chaosgym.control.controllers import Follow
+from chaosgym.control.rollout import play
 from chaosgym.machines.machine_file import template
 from tests.cli.run import run, run_json
 from tests.control.made_up import ENV
+
+
+def test_a_job_among_many_is_the_job_alone():
+    """A machine's job does not depend on those beside it: taken from two it is the one that is played alone."""
+    two, alone = (play(Follow(), ENV, machines) for machines in ([3, 4], [4]))
+    for name, values in vars(two.job(1)).items():
+        np.testing.assert_array_equal(values, vars(alone)[name], err_msg=name)
 
 
 def test_a_job_is_played_and_animated(folder, tmp_path):

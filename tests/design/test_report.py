@@ -125,10 +125,10 @@ def browser(tmp_path_factory):
 
 @pytest.fixture
 def run(monkeypatch, capsys):
-    """Run ``chaosgym design`` as its entry point does: (exit code, standard output, standard error)."""
+    """Run ``chaosgym design``, or another, as its entry point does: (exit code, standard output, standard error)."""
 
-    def command(*arguments):
-        monkeypatch.setattr(sys, "argv", ["chaosgym", "design", *map(str, arguments)])
+    def called(*arguments, command="design"):
+        monkeypatch.setattr(sys, "argv", ["chaosgym", command, *map(str, arguments)])
         try:
             main()
             code = 0
@@ -136,7 +136,7 @@ def run(monkeypatch, capsys):
             code = stop.code
         return code, *capsys.readouterr()
 
-    return command
+    return called
 
 
 def check_page(browser, path, pictures):
@@ -345,7 +345,7 @@ def test_what_was_measured_stands_beside_what_is_simulated(run, browser, tmp_pat
     own = simulate(machine, 60, transient=300).peak_force.max(axis=1)
     for factor, told in ((1.0, str(brief)), (2.0, "no brief")):
         peaks.write_text("upper\n" + "".join(f"{factor * force}\n" for force in own))
-        arguments = ("--peaks", peaks, "--column", "upper", "--sensor-error", "0.5 N", "--beside")
+        arguments = ("--beside", peaks, "--column", "upper", "--sensor-error", "0.5 N")
         code, out, err = run(brief, *arguments, "--out", page, "--overwrite")
         assert code == 0, err
         assert f"lies within what machines in the tolerances of {told} have" in out
@@ -361,30 +361,32 @@ def test_what_was_measured_stands_beside_what_is_simulated(run, browser, tmp_pat
 
 def test_a_recording_beside_no_brief_is_refused(run):
     """One line that says what is needed."""
-    for arguments in (("--beside",), ("a.toml", "--beside"), ("--peaks", "a.csv", "--beside")):
+    for arguments, why in (
+        (("--beside", "a.csv"), "give a brief"),
+        (("a.toml", "--column", "2"), "options of a recording need one: --beside FILE"),
+        (("a.toml", "--beside", "a.csv", "--plot"), "--plot goes with one brief alone"),
+    ):
         code, out, err = run(*arguments)
         assert (code, out, len(err.strip().splitlines())) == (2, "", 1)
-        assert "--beside needs a brief, and --peaks or --series" in err
+        assert why in err
 
 
 def test_the_same_brief_twice_is_refused(run):
-    """One line; several briefs go without measured forces."""
+    """One line."""
     code, _, err = run("a.toml", "a.toml")
     assert (code, len(err.strip().splitlines())) == (2, 1)
     assert "given twice" in err
-    assert "several briefs go without" in run("a.toml", "b.toml", "--load-rating", "500 N")[2]
-    assert "by --beside only" in run("a.toml", "b.toml", "--peaks", "a.csv")[2]
 
 
 def test_command_evaluates_measured_peaks(run, tmp_path):
     """Peak forces of 50 N under a rating of 100 N last 2^(10/3) million cycles."""
     path = tmp_path / "peaks.csv"
     path.write_text("50\n" * 40)
-    code, out, err = run("--peaks", path, "--load-rating", "100", "--json")
+    code, out, err = run(path, "--load-rating", "100", "--json", command="judge")
     assert code == 0, err
     assert json.loads(out)["evaluation"]["life"] == pytest.approx(2.0 ** (10.0 / 3.0))
     path.write_text("".join(f"{force}\n" for force in (30, 70, 45, 90, 38, 61) * 2))
-    code, _, err = run("--peaks", path, "--load-rating", "100")
+    code, _, err = run(path, "--load-rating", "100", command="judge")
     assert code == 2
     assert re.search(r"12 cycles are too few .* needed: \d+ or more", err)
 
@@ -395,8 +397,6 @@ def test_command_evaluates_measured_peaks(run, tmp_path):
         ((), "give a brief"),
         (("--template", "impact-bean"), "did you mean impact-beam?"),
         (("absent.toml",), "can't be read"),
-        (("--peaks", "absent.csv", "--load-rating", "100"), "can't be read"),
-        (("--peaks", "absent.csv", "--load-rating", "-100"), "load_rating = -100 N"),
         (("absent.toml", "--out", "report.pdf"), "ends in .html"),
     ],
 )
@@ -406,6 +406,14 @@ def test_wrong_usage_is_one_line_and_code_2(run, arguments, message):
     assert (code, out) == (2, "")
     assert message in err
     assert len(err.strip().splitlines()) == 1
+
+
+@pytest.mark.parametrize(("rating", "message"), [("100", "can't be read"), ("-100", "load_rating = -100 N")])
+def test_a_life_of_no_recording_or_no_rating_is_one_line(run, rating, message):
+    """As other wrong usage."""
+    code, out, err = run("absent.csv", "--load-rating", rating, command="judge")
+    assert (code, out, err.count("\n")) == (2, "", 1)
+    assert message in err
 
 
 def test_a_date_and_the_brief_are_printed_if_given(answered):

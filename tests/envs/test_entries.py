@@ -105,7 +105,6 @@ PLAYERS = {
     "trained, sees the classifier": lambda: _policy(observes=SEES_THE_CLASSIFIER),
     "shipped": lambda: shipped_policy(BEAM),
     "learned map": lambda: shipped_policy(BEAM, "fleet"),
-    "guarded": lambda: GuardedPolicy(_policy()),
     "guarded map": lambda: GuardedPolicy(shipped_policy(BEAM, "fleet")),
 }
 

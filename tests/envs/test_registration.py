@@ -20,6 +20,23 @@ def test_registering_again_changes_nothing_and_warns_of_nothing(name: str) -> No
     assert gym.spec(name) is before
 
 
+@pytest.mark.parametrize(
+    "imports",
+    [
+        "import chaosgym, gymnasium",
+        "import gymnasium, chaosgym",
+        "import chaosgym; from gymnasium.envs.registration import register; import gymnasium",
+        "import chaosgym; chaosgym.envs; import gymnasium",
+        "import chaosgym.envs.machine_env, gymnasium",
+    ],
+)
+def test_ids_are_known_whatever_is_imported_first(imports: str) -> None:
+    """Once both packages are imported, an id is enough."""
+    code = f"{imports}; print(gymnasium.make('chaosgym/ImpactBeam-v1').spec.id)"
+    run = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
+    assert run.stdout.strip() == "chaosgym/ImpactBeam-v1"
+
+
 def test_importing_the_package_loads_neither_kernels_nor_plots() -> None:
     """Registration costs no more than importing gymnasium."""
     code = "import sys, chaosgym, gymnasium; print([m for m in ('numba', 'scipy', 'matplotlib') if m in sys.modules])"

@@ -39,6 +39,7 @@ def _assert_equal_infos(one: list[dict[str, Any]], other: list[dict[str, Any]]) 
             assert np.array_equal(a[name], b[name])
 
 
+@pytest.mark.filterwarnings("ignore:options speed held for the jobs")
 def test_steps_equal_those_of_dummy_vec_env() -> None:
     """Observations, rewards, ends, infos, terminal observations, truncation flags and reset infos agree to the bit."""
     envs = [SB3VecEnv(BEAM, 3, max_episode_steps=4, **SHORT), _dummy(3, max_episode_steps=4, **SHORT)]

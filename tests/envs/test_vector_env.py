@@ -265,8 +265,41 @@ def test_bad_calls_are_named() -> None:
     ):
         with pytest.raises(ParameterError, match="options"):
             envs.reset(options=options)
-    with pytest.raises(ParameterError, match="seed has 3 entries"):
+    with pytest.raises(ParameterError, match=r"seed = .* is not usable; allowed: one whole number, or "):
         envs.reset(seed=[1, 2, 3])
     assert envs.step(action)[2].all()
     with pytest.raises(gym.error.ResetNeeded, match=re.escape("[0, 1]")):
         envs.step(action)
+
+
+def test_what_is_lost_or_clipped_is_said():
+    """Options after an autoreset, actions outside the box, and a seed that is none; each in one line."""
+    envs = gym.make_vec(BEAM, num_envs=2, steps=2, action="continuous", autoreset_mode="SameStep").unwrapped
+    with pytest.raises(
+        ParameterError, match=r"seed = 7.0 is not usable; allowed: one whole number, or 2 whole numbers"
+    ):
+        envs.reset(seed=7.0)
+    _, info = envs.reset(seed=7, options={"machine": 5})
+    assert info["machine"].tolist() == [5, 5]
+    inside = np.zeros((2, 2), np.float32)
+    envs.step(inside)
+    with pytest.warns(UserWarning, match="options machine held for the jobs that reset"):
+        _, _, ended, _, info = envs.step(inside)
+    assert ended.all()
+    assert info["machine"].tolist() == [-1, -1]
+    with pytest.warns(
+        UserWarning, match="actions outside the box are clipped; allowed with action='continuous': -1 to 1"
+    ):
+        envs.step(3.0 * np.ones((2, 2), np.float32))
+    for _ in range(4):
+        envs.step(inside)
+
+
+def test_the_specification_keeps_what_it_was_given():
+    """A dictionary that the caller changes after ``make`` changes no specification."""
+    tolerances = {"clearance": 0.1}
+    made = gym.make(BEAM, tolerances=tolerances), gym.make_vec(BEAM, num_envs=1, tolerances=tolerances)
+    tolerances["clearance"] = 0.5
+    for env in made:
+        assert env.spec.kwargs["tolerances"] == {"clearance": 0.1}
+        assert env.unwrapped.spec.kwargs["tolerances"] == {"clearance": 0.1}

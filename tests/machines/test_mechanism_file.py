@@ -314,7 +314,8 @@ def test_every_command_and_environment_takes_it(kind, file_of, tmp_path, monkeyp
     machine = chaosgym.read_machine(path)
     assert len(answer("simulate", path, "--cycles", 4, "--plot", "s.png")["peak_force_N"]) == 4
     assert answer("show", path, "--plot", "m.png")["degrees_of_freedom"] == list(machine.degrees_of_freedom)
-    assert answer("diagnose", path, "--budget", 200, "--step-check", "--plot", "d.png")["nature"]
+    assert answer("diagnose", path, "--budget", 200, "--plot", "d.png")["nature"]
+    assert answer("tradeoff", path, "--step-check")["nature"]
     assert all(Path(name).stat().st_size > 5000 for name in ("s.png", "m.png", "d.png"))
     low, high = machine.usual_ranges[machine.clearance_field]
     axes = ("--axis", f"{machine.clearance_field}={low}:{high}:2", "--axis", "speed=300:400:2")

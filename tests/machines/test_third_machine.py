@@ -70,8 +70,8 @@ def test_simulate_and_show():
 
 
 def test_diagnose():
-    """Nature, type and step check speak of one run."""
-    found = answer("diagnose", NAME, "--budget", 200, "--types", "--step-check")
+    """Nature and type speak of one run."""
+    found = answer("diagnose", NAME, "--budget", 200, "--types")
     assert found["nature"] in ("periodic", "chaotic", "quasiperiodic", "undetermined")
     assert found["response_type"] in ("I", "II", "III", "undetermined")
 

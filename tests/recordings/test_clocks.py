@@ -39,11 +39,12 @@ CLOCKS = {
     "whole seconds since 1970": ("time,force\n", lambda k, x: f"{1_649_770_330 + (k + 300) // 1000},{x}"),
     "stamps of 10 ms": ("Time [s],Force [N]\n", lambda k, x: f"{(k + 3) // 10 / 100:.2f},{x}"),
     "a rate that tells the unit": ("Sample rate: 1000 Hz\ntime,force\n", lambda k, x: f"{k},{x}"),
-    # GL840 user's manual, chapter 4: CSV with a date and time in whole seconds and a column of milliseconds
-    "Graphtec GL840": (
-        '"Vendor","GRAPHTEC Corporation"\n"Model","GL840"\n"Version","Ver1.06"\n"Total data points","6000"\nData\n'
-        "Number,Date&Time,ms,CH1\nNO.,Time,ms,V\n",
-        lambda k, x: f"{k + 1},2022/04/12 13:32:{10 + k // 1000},{k % 1000:03d},{x:+}",
+    "Graphtec GL820": (
+        "Vendor,GRAPHTEC Corporation\nModel,GL820\nVersion,Ver1.12\nSampling,1ms\nTotal data points,6000       \n"
+        "Start time,2022-04-12,13:32:10\nEnd time,2022-04-12,13:32:16\nTrigger time,2022-04-12,13:32:10\nAMP Settings\n"
+        'CH,Signal name,Input,Range,Filter,Span\nCH1, " CH 1",DC,1V,Off,1.000000,0.000000,V\nLogic/Pulse,Off\nData\n'
+        "Number,Date&Time,ms,CH1,Alarm1-10,Alarm11-20,AlarmOut\nNO.,Time,ms,V,A1234567890,A1234567890,A1234\n",
+        lambda k, x: f"{k + 1},2022/04/12 13:32:{10 + k // 1000},{k % 1000:03d},{x:+},LLLLLLLLLL,LLLLLLLLLL,LLLL",
     ),
 }
 
@@ -63,6 +64,7 @@ def test_clocks_give_the_rate(clock, tmp_path):
     [
         ("time,force\n", lambda k, x: f"{50 * k},{x}", "rises in steps of 50 without a unit; .*20 if these are milli"),
         ("time,force\n", lambda k, x: f"{0.5 * k},{x}", "rises in steps of 0.5 without a unit; .*2000 if these are"),
+        ("Sample rate: 500 Hz\ntime,force\n", lambda k, x: f"{k / RATE:.3f},{x}", "of 0.001 .*the file states 500 Hz"),
         ("time,force\n", lambda k, x: f"13:32:{10 + k // 3000},{x}", "too coarse to tell samples apart; use --rate-hz"),
         ("time,force\n", lambda k, x: f"{1_000_000_000 + 500 * k},{x}", "in steps of 500 without a unit"),
         (

@@ -5,7 +5,7 @@ import tracemalloc
 import numpy as np
 import pytest
 
-from chaosgym.errors import DiagnosisError
+from chaosgym.errors import DiagnosisError, ParameterError
 from chaosgym.recordings.cycles import cycle_period, peaks_of_series
 from chaosgym.recordings.judge import judge_peaks
 from chaosgym.recordings.read import read_recording
@@ -115,14 +115,19 @@ def test_series_that_cannot_be_cut_are_refused(stamps, message, tmp_path):
         peaks_of_series(found, period=0.5)
 
 
-def test_the_cycle_is_stated_once():
-    """Turns a minute, cycles a second or seconds a cycle."""
-    assert cycle_period(1200.0, None, None) == cycle_period(None, 20.0, None) == cycle_period(None, None, 0.05) == 0.05
-    assert cycle_period(None, None, None) is None
-    with pytest.raises(DiagnosisError, match="both state the cycle"):
-        cycle_period(1200.0, 20.0, None)
-    with pytest.raises(DiagnosisError, match="above 0"):
-        cycle_period(0.0, None, None)
+@pytest.mark.parametrize("text", ["1200 rpm", "20 Hz", "0.02 kHz", "50 ms", "0.05s"])
+def test_a_cycle_is_stated_by_its_speed_or_its_time(text):
+    """Turns a minute, cycles a second or the time of one."""
+    assert cycle_period(text) == pytest.approx(0.05, rel=1e-15)
+
+
+@pytest.mark.parametrize(
+    ("text", "why"), [("20", "no unit"), ("0 Hz", "above 0"), ("-3 s", "above 0"), ("3 N", "unit")]
+)
+def test_a_cycle_without_unit_or_size_is_refused(text, why):
+    """The message says what is allowed."""
+    with pytest.raises(ParameterError, match=why):
+        cycle_period(text)
 
 
 def test_a_reading_that_alternates_with_every_sample_is_too_coarse(tmp_path):

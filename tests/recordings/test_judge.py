@@ -101,7 +101,9 @@ def test_chaos_of_maps_is_found_through_one_percent_of_noise():
 def test_random_scatter_is_never_chaos():
     """Normal scatter of 6 N around 100 N, whatever is stated of the sensor: periodic within it, or undetermined."""
     peaks = 100.0 + 6.0 * np.random.default_rng(0).normal(size=500)
-    assert "random or chaotic, this record cannot tell" in judge_peaks(peaks, sensor_error=1.0).diagnosis.reason
+    beyond = judge_peaks(peaks, sensor_error=1.0).diagnosis
+    assert "no reading can be forecast from those before" in beyond.reason
+    assert beyond.tells_more == ("a second sensor", "the machine's model")
     assert judge_peaks(peaks).diagnosis.nature == "undetermined"
     wide = judge_peaks(peaks, sensor_error=10.0).diagnosis
     outside = 100.0 * np.mean(np.abs(peaks - peaks.mean()) > 10.0)
@@ -221,7 +223,7 @@ def test_a_scatter_that_could_be_either_asks_for_the_error():
     """60 cycles with a scatter of 1 % are undetermined, and the verdict asks for the sensor's error and more cycles."""
     verdict = judge_peaks(48.9 + 0.489 * np.random.default_rng(6).normal(size=60)).diagnosis
     assert verdict.nature == "undetermined"
-    assert verdict.reason.endswith("cannot tell")
+    assert "noise and fast chaos look alike" in verdict.reason
     assert verdict.tells_more[:2] == ("the sensor's error", "more cycles")
     assert verdict.statement.tells_more.startswith("the sensor's error, more cycles, ")
 

@@ -4,7 +4,6 @@ import contextlib
 import gc
 import io
 import sys
-import warnings
 
 import numpy as np
 import pytest
@@ -15,6 +14,7 @@ from chaosgym.recordings.columns import choose_force
 from chaosgym.recordings.read import read_recording
 from chaosgym.recordings.sampling import sampling
 from tests.cli.run import run
+from tests.recordings import writers
 
 RATE = 2000.0
 FORCE = 20.0 + 15.0 * np.sin(0.7 * np.arange(60))
@@ -72,23 +72,14 @@ def excel(path):
     book.save(path)
 
 
-def universal(path, binary=0):
+def universal(path):
     """A universal file, data set 58, by pyuff."""
-    pyuff = pytest.importorskip("pyuff")
-    told = {"func_type": 1, "rsp_node": 1, "rsp_dir": 1, "ref_dir": 1, "ref_node": 0, "ord_data_type": 4}
-    kinds = {"abscissa_spec_data_type": 17, "ordinate_spec_data_type": 13, "orddenom_spec_data_type": 0}
-    shape = {"num_pts": 60, "abscissa_spacing": 1, "abscissa_inc": 1.0 / RATE, "abscissa_min": 0.0}
-    named = {"id1": "Force", "ordinate_axis_units_lab": "N", "rsp_ent_name": "rig", "ref_ent_name": "rig"}
-    one = pyuff.prepare_58(binary=binary, **told, **kinds, **shape, **named, data=FORCE, x=TIME)
-    with warnings.catch_warnings():
-        warnings.simplefilter("ignore", ResourceWarning)  # pyuff leaves its file to the collector
-        pyuff.UFF(str(path)).write_sets(one, mode="add")
-        gc.collect()
+    writers.universal(path, "Force", "N", FORCE, step=1.0 / RATE)
 
 
 def universal_binary(path):
     """The same with binary numbers, 58b."""
-    universal(path, 1)
+    writers.universal(path, "Force", "N", FORCE, 1, 1.0 / RATE)
 
 
 EVERY = [tdms, mdf, hdf, matlab_of_version_7_3, matlab_structure, excel, universal, universal_binary]
@@ -197,7 +188,7 @@ def test_a_sheet_is_named_by_an_option(tmp_path):
     path = tmp_path / "rig.xlsx"
     rows = [("peak [N]",), *((40.0 + place % 2,) for place in range(200))]
     workbook(path, One=[("peak [N]",), *rows[1:100]], Two=rows)
-    code, out, _ = run("diagnose", "--peaks", path, "--sheet", "Two", "--sensor-error", "0.1 N")
+    code, out, _ = run("judge", path, "--sheet", "Two", "--sensor-error", "0.1 N")
     assert (code, "Excel, sheet 'Two' of 'One', 'Two', column 'peak' (N), 200 readings" in out) == (0, True)
 
 

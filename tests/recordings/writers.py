@@ -88,15 +88,15 @@ def excel(path, title, unit, values):
     path.write_bytes(stream.getvalue())
 
 
-def universal(path, title, unit, values, binary=0):
+def universal(path, title, unit, values, binary=0, step=0.001):
     """A data set 58 of pyuff."""
     pyuff = pytest.importorskip("pyuff")
     kinds = {"abscissa_spec_data_type": 17, "ordinate_spec_data_type": 13, "orddenom_spec_data_type": 0}
     places = {"func_type": 1, "rsp_node": 1, "rsp_dir": 1, "ref_dir": 1, "ref_node": 0, "ord_data_type": 4}
-    shape = {"num_pts": len(values), "abscissa_spacing": 1, "abscissa_inc": 0.001, "abscissa_min": 0.0}
+    shape = {"num_pts": len(values), "abscissa_spacing": 1, "abscissa_inc": step, "abscissa_min": 0.0}
     named = {"id1": title, "ordinate_axis_units_lab": unit or "NONE", "rsp_ent_name": "rig", "ref_ent_name": "rig"}
     one = pyuff.prepare_58(
-        binary=binary, **places, **kinds, **shape, **named, data=values, x=np.arange(len(values)) * 0.001
+        binary=binary, **places, **kinds, **shape, **named, data=values, x=np.arange(len(values)) * step
     )
     with warnings.catch_warnings():
         warnings.simplefilter("ignore", ResourceWarning)  # pyuff leaves its file to the collector

@@ -236,7 +236,7 @@ class MachineClassifier:
     def _model(self, name: str) -> ResponseClassifier:
         if name not in self.records:
             raise ModelFileError(
-                f"no classifier of records is trained for {self.machine.name}: `chaosgym diagnose --peaks` judges them "
+                f"no classifier of records is trained for {self.machine.name}: `chaosgym judge` judges them "
                 "without one, and `chaosgym sweep --signals SHARE` gives data to train one on"
             )
         return self.records[name]

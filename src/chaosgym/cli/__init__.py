@@ -24,8 +24,13 @@ COMMANDS = {
     "show": "simulate:show",
     "new-machine": "simulate:new_machine",
     "diagnose": "diagnose:diagnose",
+    "judge": "judge:judge",
+    "judge-sweep": "judge:judge_sweep",
+    "run-up": "judge:run_up",
+    "monitor": "monitor:monitor",
+    "fit": "fit:fit",
+    "overlay": "fit:overlay",
     "branch": "branch:branch",
-    "overlay": "diagnose:overlay",
     "explore": "demo:explore",
     "classify": "classify:classify",
     "sweep": "sweep:sweep",
@@ -39,6 +44,9 @@ COMMANDS = {
     "info": "info:info",
 }
 """Module in this folder and function of every command."""
+
+RESPELT = {"diagnose", "overlay", "classify", "design"}
+"""Commands with former spellings."""
 
 MOVED = {
     "dataset build": "`python -m benchmarks build-dataset MACHINE` makes it in a clone of the repository",
@@ -70,6 +78,14 @@ class Group(click.Group):
 class Commands(Group):
     """Commands that are imported when they are called."""
 
+    def parse_args(self, ctx: click.Context, args: list[str]) -> list[str]:
+        """Parse the arguments, in their former spelling too."""
+        if args[:1] and args[0] in RESPELT and not ctx.resilient_parsing:
+            from chaosgym.cli.former import rewritten
+
+            args = rewritten(args)
+        return super().parse_args(ctx, args)
+
     def list_commands(self, ctx: click.Context) -> list[str]:
         """Return the names of all commands."""
         return list(COMMANDS)
@@ -86,7 +102,7 @@ class Commands(Group):
 @click.group(cls=Commands, context_settings={"help_option_names": ["-h", "--help"], "max_content_width": 110})
 @click.version_option(__version__, prog_name="chaosgym")
 def app() -> None:
-    """Machines with clearance that rattle: simulate, diagnose, sweep and classify them."""
+    """Machines with clearance that rattle: simulate, diagnose, sweep and classify them; judge recordings."""
 
 
 def main() -> None:

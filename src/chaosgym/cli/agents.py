@@ -1,11 +1,12 @@
 """The commands ``compare`` and ``run-agent``: how controllers and trained agents do on machines."""
 
+import json
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import click
 
-from chaosgym.cli.machine_options import Quantity
+from chaosgym.cli.options import Quantity
 from chaosgym.cli.output import AS_JSON, emit, patience, picture_path, plot_option
 
 if TYPE_CHECKING:
@@ -110,6 +111,9 @@ def compare(
 @click.option("--level", type=click.Choice(LEVELS), default=None, help="What differs from job to job.")
 @click.option("--load-rating", type=Quantity("N"), help="Of the joint, by which its life is told in hours.")
 @click.option("--plant", default=None, metavar="MODULE:CLASS", help="Your machine instead; - for lines of text.")
+@click.option(
+    "--plant-arg", "arguments", multiple=True, metavar="NAME=VALUE", help="Argument of CLASS; may be repeated."
+)
 @plot_option("--out", formats="figure .png, .svg, .pdf or animation .gif, .mp4")
 @AS_JSON
 def run_agent(
@@ -119,6 +123,7 @@ def run_agent(
     level: str | None,
     load_rating: float | None,
     plant: str | None,
+    arguments: tuple[str, ...],
     plot: str | None,
     as_json: bool,
 ) -> None:
@@ -139,8 +144,10 @@ def run_agent(
             raise click.UsageError("--load-rating is of simulated machines; leave it out with --plant")
         if plot is not None:
             raise click.UsageError("--out draws what a simulation tells; leave it out with --plant")
-        _at_plant(env, policy, machine, plant, as_json)
+        _at_plant(env, policy, machine, plant, arguments, as_json)
         return
+    if arguments:
+        raise click.UsageError("--plant-arg is an argument of a plant; give --plant MODULE:CLASS too")
     out = _picture(plot, env)
     from chaosgym.control.controllers import Follow, Kriging
     from chaosgym.control.policies import load_policy, shipped_policy
@@ -168,29 +175,62 @@ def run_agent(
     emit(result, as_json, lambda: _job_lines(name, job, follow, load_rating, out))
 
 
-def _at_plant(env: str, policy: Path | None, machine: int, name: str, as_json: bool) -> None:
-    """A job at a machine of the user's, beside following the demand there."""
+def _at_plant(
+    env: str, policy: Path | None, machine: int, name: str, arguments: tuple[str, ...], as_json: bool
+) -> None:
+    """A job at a machine of the user's, beside following the demand there; what was played is told in any case."""
     from chaosgym.control.controllers import Follow, Kriging
+    from chaosgym.control.guard import GuardedPolicy, can_guard
     from chaosgym.control.operator import Operator
-    from chaosgym.control.plant import Lines, plant_of, work
+    from chaosgym.control.plant import Lines, PlantError, Worked, plant_of, work
     from chaosgym.control.policies import load_policy
     from chaosgym.control.rollout import Policy
 
-    agent: Policy = Kriging() if policy is None else load_policy(policy)
-    operators = Operator(agent, env), Operator(Follow(), env)
-    plant = plant_of(name)
-    job, follow = (work(plant, operator, machine, name) for operator in operators)
-    if isinstance(plant, Lines):
-        plant.done()
-    life = follow.damage / job.damage if job.damage > 0.0 else None
-    result = {"agent": type(agent).__name__, "env": env, "plant": name, "job": machine, **job.as_dict(), "life": life}
-    told = [
-        f"{who}: {worked.as_dict()['mean_deviation']:.2f} off the demand, mean peak {worked.mean_peak.mean():.1f} N, "
-        f"largest force {worked.largest_force:.1f} N"
-        for who, worked in ((type(agent).__name__, job), ("following the demand", follow))
-    ]
-    told += [] if life is None else [f"{LIFE}: x{life:.2f} against following the demand"]
-    emit({**result, "follow": follow.as_dict()}, as_json, lambda: told)
+    agent: Policy = Kriging()
+    if policy is not None:
+        trained = load_policy(policy)
+        agent = GuardedPolicy(trained) if can_guard(trained) else trained
+    name_of_agent = type(getattr(agent, "policy", agent)).__name__
+    operators = {name_of_agent: Operator(agent, env), "following the demand": Operator(Follow(), env)}
+    plant = plant_of(name, **_named_values(arguments))
+    played: dict[str, Worked] = {}
+    failure: PlantError | None = None
+    try:
+        for who, operator in operators.items():
+            played[who] = work(plant, operator, machine, name)
+    except PlantError as error:
+        failure, worked = error, error.worked
+        played |= {} if worked is None else {who: worked}
+    finally:
+        if isinstance(plant, Lines):
+            plant.done()
+    if played:
+        jobs = list(played.values())
+        whole = failure is None and jobs[0].damage > 0.0
+        life = jobs[1].damage / jobs[0].damage if whole else None
+        result = {"agent": name_of_agent, "env": env, "plant": name, "job": machine, **jobs[0].as_dict()}
+        result |= {"life": life, "follow": jobs[1].as_dict() if len(jobs) > 1 else None}
+        result |= {} if failure is None else {"failure": str(failure)}
+        told = [line for who, job in played.items() for line in job.lines(who)]
+        told += [] if life is None else [f"{LIFE}: x{life:.2f} against following the demand"]
+        emit(result, as_json, lambda: told)
+    if failure is not None:
+        steps = len(jobs[-1].speed) if played else 0
+        raise PlantError(f"{failure}; {steps} steps of the job {who} were played") from failure
+
+
+def _named_values(arguments: tuple[str, ...]) -> dict[str, Any]:
+    """Arguments NAME=VALUE by name; a value is JSON, or else text."""
+    values: dict[str, Any] = {}
+    for given in arguments:
+        name, separator, value = given.partition("=")
+        if not separator or not name.isidentifier():
+            raise click.UsageError(f"--plant-arg {given}: allowed: NAME=VALUE")
+        try:
+            values[name] = json.loads(value)
+        except ValueError:
+            values[name] = value
+    return values
 
 
 def _picture(plot: str | None, env: str) -> Path | None:

@@ -7,8 +7,9 @@ from typing import Any
 import click
 import numpy as np
 
-from chaosgym.cli.machine_options import FloatRange, machine_command
-from chaosgym.cli.output import WORKERS, check_target, draw, emit, picture_path, plot_option, write_table
+from chaosgym.cli.machine_options import machine_command
+from chaosgym.cli.options import FloatRange
+from chaosgym.cli.output import WORKERS, check_target, emit, picture_path, plot_option, write_table
 
 SHOWN = 30
 """Branches, and bifurcations, that the table shows; all are in --out and --json."""
@@ -97,13 +98,13 @@ def branch(
         write_table(_columns(found), out)
         result["out"] = out
         lines.append(f"written to {out}")
-    draw(
+    emit(
+        result,
+        as_json,
+        lambda: lines,
         picture,
         lambda plots: plots.branch_figure(found) if against is None else plots.bifurcation_map_figure(found),
-        result,
-        lines,
     )
-    emit(result, as_json, lambda: lines)
 
 
 def _axis(machine: Any, text: str) -> Any:

@@ -2,98 +2,84 @@
 
 import os
 import sys
-from collections.abc import Iterable
 from itertools import pairwise
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import click
 
-from chaosgym.cli.machine_options import FloatRange, Quantity, machine_command
-from chaosgym.cli.measured_options import Measured, measured_options, measured_runs, run_as_dict, run_lines
-from chaosgym.cli.output import AS_JSON, draw, emit, patience, picture_path, plot_option
-from chaosgym.machines import MACHINES
+from chaosgym.cli.judge import run_lines
+from chaosgym.cli.machine_options import machine_command
+from chaosgym.cli.options import FloatRange, recording_options
+from chaosgym.cli.output import AS_JSON, emit, patience, picture_path, plot_option
 
-KERNELS = ("--follow", "--batch")
-"""Options under which the machine code of the kernels is worth its loading."""
+if TYPE_CHECKING:
+    from chaosgym.recordings.runs import RecordingOptions, Run
+
+OTHER_FILES = ("--model", "--batch", "--out", "--plot")
+"""Options whose word may be the name of a file that is no record."""
 
 
 def _quick_start(arguments: list[str]) -> None:
     """Run the Python source of the kernels for one record, or parameters alone: loading machine code takes longer."""
-    learned = {"--peaks", "--series", "--budget-us=0"} & {*arguments} or ("--budget-us", "0") in pairwise(arguments)
-    if learned and not ({*KERNELS} & {*arguments} or "numba" in sys.modules):
+    pairs = [*pairwise(arguments)]
+    record = any((word == "-" or Path(word).is_file()) and before not in OTHER_FILES for before, word in pairs)
+    learned = record or "--budget-us=0" in arguments or ("--budget-us", "0") in pairs
+    if learned and not ("--batch" in arguments or "numba" in sys.modules):
         os.environ["NUMBA_DISABLE_JIT"] = "1"
 
 
-@machine_command(required=False, before=_quick_start)
+@machine_command(before=_quick_start)
+@click.argument("file", metavar="[FILE]", required=False)
 @click.option(
     "--budget-us",
     type=FloatRange(0.0),
     help="Processor time [us] for the answer; 0: from parameters alone. Default: what it takes to be sure.",
 )
 @click.option("--nature-only", is_flag=True, help="Don't judge the type, which needs the four neighbours.")
-@click.option("--follow", is_flag=True, help="Watch peaks from standard input, one a line: a monitor with an alarm.")
-@click.option("--log", type=click.Path(dir_okay=False), help="CSV file to which --follow appends its events.")
-@click.option("--delimiter", metavar="TEXT", help="Between the columns of --follow; default: found from each line.")
-@click.option("--timeout-s", type=Quantity("s"), help="Time without a line after which --follow says: stalled.")
 @click.option("--batch", type=click.Path(exists=True, dir_okay=False), help="Judge every row of a Parquet file.")
 @click.option("--out", type=click.Path(dir_okay=False), help="Parquet file for the answers of --batch.")
-@measured_options
+@recording_options()
 @click.option(
     "--model", type=click.Path(exists=True, dir_okay=False), help="Classifier file; default: the shipped one."
 )
 @plot_option()
 def classify(
     machine: Any,
-    measured: Measured,
+    file: str | None,
+    options: "RecordingOptions",
     budget_us: float | None,
     nature_only: bool,
-    follow: bool,
-    log: str | None,
-    delimiter: str | None,
-    timeout_s: float | None,
     batch: str | None,
     out: str | None,
     model: str | None,
     plot: str | None,
     as_json: bool,
 ) -> None:
-    """Tell response type (I, II, III) and nature by as few cycles as it takes, with proof where periodic."""
-    if machine is None:
-        raise click.UsageError(f"give a machine: {', '.join(MACHINES)}")
-    if sum(map(bool, (measured, follow, batch))) > 1:
-        raise click.UsageError("--peaks or --series, --follow and --batch exclude each other")
+    """Tell response type (I, II, III) and nature by as few cycles as it takes, with proof where periodic.
+
+    With FILE, what was recorded of the machine: the verdict of all tests, and what the classifier has learned beside.
+    """
+    from chaosgym.classifier import MachineClassifier, classifier_for
+    from chaosgym.recordings.runs import RecordingOptions
+
     if bool(batch) != bool(out):
         raise click.UsageError("--batch FILE and --out FILE belong together: give both or neither")
-    half_width = _half_width(measured, follow)
-    if (budget_us is not None or nature_only) and (measured or follow):
-        raise click.UsageError("--budget-us and --nature-only belong to a machine or --batch, not to records")
-    for name, given in (("--log", log), ("--delimiter", delimiter), ("--timeout-s", timeout_s)):
-        if given is not None and not follow:
-            raise click.UsageError(f"{name} belongs to --follow")
-    if timeout_s is not None and not 0.0 < timeout_s < 1e6:
-        raise click.UsageError(f"--timeout-s {timeout_s:g} is out of range; allowed: above 0")
-    if plot and not measured:
-        raise click.UsageError("--plot goes with --peaks or --series; `chaosgym diagnose` draws a machine")
-    if follow:
-        from chaosgym.recordings.stream import LineReader
-
-        reader = LineReader(measured.column, delimiter, measured.unit, measured.scale)
-        return _follow(sys.stdin, reader, half_width, log, timeout_s, as_json)
-    from chaosgym.classifier import MachineClassifier, classifier_for
-
+    if file and (batch or nature_only or budget_us is not None):
+        raise click.UsageError("FILE goes without --batch, --nature-only and --budget-us, which are of machines")
+    if not file and (plot or options != RecordingOptions()):
+        raise click.UsageError(f"--plot and options of a recording need one: classify {machine.name} FILE")
     classifier = MachineClassifier.load(model) if model else classifier_for(machine)
     if classifier.machine.name != machine.name:
         raise click.UsageError(f"--model {model} knows {classifier.machine.name}, not {machine.name}")
-    if measured:
-        _classify_measured(classifier, measured, half_width, plot, as_json)
+    if file:
+        _classify_recording(classifier, file, options, plot, as_json)
     elif batch and out:
         _classify_batch(classifier, batch, out, budget_us, not nature_only, as_json)
     else:
         with patience("classify"):
             answer = classifier.classify(machine, budget_us=budget_us, types=not nature_only)
         emit({"machine": machine.name, **answer.as_dict()}, as_json, lambda: _machine_lines(machine.name, answer))
-    return None
 
 
 def _machine_lines(name: str, answer: Any) -> list[str]:
@@ -120,16 +106,6 @@ def _bars(chances: dict[str, float]) -> list[str]:
     return [f"  {name:12s} {'#' * round(40 * chance):40s} {chance:.3f}" for name, chance in chances.items()]
 
 
-def _half_width(measured: Measured, follow: bool) -> float | None:
-    """Half width [N] of the stated error; None if none is stated."""
-    from chaosgym.series.noise import stated_error
-
-    told = stated_error(measured.sensor_error, measured.sensor_sigma)
-    if told is not None and not (measured or follow):
-        raise click.UsageError("--sensor-error belongs to --peaks, --series or --follow")
-    return None if told is None else told.half_width
-
-
 def _learned_lines(answer: Any) -> list[str]:
     chances = _chances(answer)
     if not chances:
@@ -141,29 +117,48 @@ def _learned_lines(answer: Any) -> list[str]:
     return [head, *_bars(chances), *warning]
 
 
-def _classify_measured(
-    classifier: Any, measured: Measured, half_width: float | None, plot: str | None, as_json: bool
+def _classify_recording(
+    classifier: Any, file: str, options: "RecordingOptions", plot: str | None, as_json: bool
 ) -> None:
     """Print the one verdict on each run, and the classifier's chances where they agree with it."""
-    from chaosgym.errors import DiagnosisError
+    from chaosgym.recordings.runs import judged_runs
 
-    machine = classifier.machine.name
-    picture = picture_path(plot, f"classify-{machine}")
-    results, lines, drawn = {}, [], []
-    runs = measured_runs(measured, several=True, of_force=True)
-    for run in runs:
-        try:
-            answer = classifier.classify_record(run.peaks, sensor_error=half_width).under(run.verdict.diagnosis)
-        except DiagnosisError as error:
-            raise DiagnosisError(f"{run.source}, run {run.name!r}: {error}") from error
-        results[run.name] = {**answer.as_dict(), "verdict": run_as_dict(run)}
-        lines += run_lines(f"{machine}, measured" if len(runs) == 1 else run.name, run)
-        lines += _learned_lines(answer)
-        drawn.append((run.name, run.peaks, run.verdict.diagnosis, _chances(answer)))
-    (only,) = results.values() if len(results) == 1 else (None,)
-    result = {"machine": machine, **only} if only else {"machine": machine, "runs": results}
-    draw(picture, lambda plots: plots.classified_figure(drawn), result, lines)
-    emit(result, as_json, lambda: lines)
+    name = classifier.machine.name
+    picture = picture_path(plot, f"classify-{name}")
+    with patience("read and judge the recording"):
+        runs = judged_runs(file, options, several=True, of_force=True)
+        answers = [_record_answer(classifier, run, options) for run in runs]
+    both = [*zip(runs, answers, strict=True)]
+    results = [{**answer.as_dict(), "verdict": run.as_dict()} for run, answer in both]
+    of_one = {"runs": {run.name: one for run, one in zip(runs, results, strict=True)}} if len(runs) > 1 else results[0]
+    emit(
+        {"machine": name, **of_one},
+        as_json,
+        lambda: [
+            line
+            for run, answer in both
+            for line in (
+                *run_lines(run.name if len(runs) > 1 else f"{name}, measured", run),
+                *_learned_lines(answer),
+            )
+        ],
+        picture,
+        lambda plots: plots.classified_figure(
+            [(run.name, run.peaks, run.verdict.diagnosis, _chances(answer)) for run, answer in both]
+        ),
+    )
+
+
+def _record_answer(classifier: Any, run: "Run", options: "RecordingOptions") -> Any:
+    from chaosgym.errors import DiagnosisError
+    from chaosgym.series.noise import stated_error
+
+    error = stated_error(options.sensor_error, options.sensor_sigma)
+    half_width = None if error is None else error.half_width
+    try:
+        return classifier.classify_record(run.peaks, sensor_error=half_width).under(run.verdict.diagnosis)
+    except DiagnosisError as why:
+        raise DiagnosisError(f"{run.source}, run {run.name!r}: {why}") from why
 
 
 def _chances(answer: Any) -> dict[str, float]:
@@ -187,49 +182,6 @@ def _classify_batch(
             *(f"  {name:9s} {count}" for name, count in summary["natures"].items()),
         ],
     )
-
-
-GIVE_UP = 100
-"""Lines without a reading after which the stream is taken for the wrong one."""
-
-
-def _follow(
-    lines: Iterable[str],
-    reader: Any,
-    sensor_error: float | None,
-    log: str | None,
-    timeout: float | None,
-    as_json: bool,
-) -> None:
-    """Print a verdict each cycle, and a line for every event; what is no reading is counted, warned of and survived."""
-    from chaosgym.errors import DiagnosisError
-    from chaosgym.recordings.monitor import LONGEST, EventLog, Monitor
-    from chaosgym.recordings.stream import stalls
-
-    monitor = Monitor(sensor_error, longest_period=LONGEST)
-    with EventLog(log) as events:
-        for number, line in stalls(lines, timeout):
-            if line is None:
-                emit({"event": "stalled", "cycle": monitor.cycle}, as_json, lambda: ["no reading comes  <- stalled"])
-                sys.stdout.flush()
-                continue
-            try:
-                peak = reader.read(line, number, first=monitor.cycle == 0)
-                if peak is None and (number < GIVE_UP or monitor.cycle):
-                    continue
-                if peak is None:
-                    raise DiagnosisError(f"the first {number} lines hold no reading; state --column and --delimiter")
-                seen = monitor.update(peak)
-            except DiagnosisError as error:
-                if monitor.cycle == 0:
-                    raise
-                seen = monitor.skip()
-                click.echo(f"warning: {error}; left out, {monitor.missing} so far", err=True)
-            events.note(seen)
-            emit(seen.as_dict(), as_json, lambda: [str(seen)])  # noqa: B023
-            sys.stdout.flush()
-    if monitor.cycle == 0:
-        raise click.UsageError("--follow found no peak on standard input")
 
 
 @click.command("train-classifier")

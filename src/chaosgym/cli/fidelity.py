@@ -6,8 +6,9 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
-from chaosgym.cli.machine_options import FloatRange, machine_command
-from chaosgym.cli.output import WORKERS, emit
+from chaosgym.cli.machine_options import machine_command
+from chaosgym.cli.options import FloatRange
+from chaosgym.cli.output import WORKERS, emit, patience, verdict_lines
 
 if TYPE_CHECKING:
     from chaosgym.fidelity.tradeoff import Tradeoff, TradeoffRow
@@ -28,6 +29,7 @@ FOLDER = click.Path(file_okay=False, path_type=Path)
 )
 @WORKERS
 @click.option("--out", type=FOLDER, default=None, help="Write tradeoff.json and tradeoff.png there.")
+@click.option("--step-check", is_flag=True, help="Instead, repeat the verdict with finer steps: does it stay?")
 def tradeoff(
     machine: Any,
     points: int,
@@ -36,11 +38,14 @@ def tradeoff(
     budget: float,
     workers: int | None,
     out: Path | None,
+    step_check: bool,
     as_json: bool,
 ) -> None:
     """Measure every rung of a machine, and fixed steps, against its reference: cost, errors, Pareto front."""
     from chaosgym.fidelity.tradeoff import tradeoff as measure
 
+    if step_check:
+        return _step_check(machine, as_json)
     result = measure(
         machine, points=points, cycles=cycles, transient=transient, budget=budget, workers=workers, progress=True
     )
@@ -48,7 +53,19 @@ def tradeoff(
         from chaosgym.plotting.fidelity import tradeoff_figure
 
         write_result(out, "tradeoff", result.as_dict(), tradeoff_figure(result))
-    emit(result.as_dict(), as_json, lambda: _tradeoff_lines(result))
+    return emit(result.as_dict(), as_json, lambda: _tradeoff_lines(result))
+
+
+def _step_check(machine: Any, as_json: bool) -> None:
+    """Judge one machine with its own step and with finer ones."""
+    from chaosgym.diagnosis.step_check import step_check
+
+    with patience("diagnose with finer steps"):
+        check = step_check(machine)
+    verdict = check.given.as_dict()
+    shown = {name: verdict[name] for name in ("nature", "period", "reason", "statement")}
+    result = {"machine": machine.name, **shown, "step_check": check.as_dict()}
+    emit(result, as_json, lambda: [*verdict_lines(machine.name, check.given, []), f"  {check.summary}"])
 
 
 def _tradeoff_lines(result: "Tradeoff") -> list[str]:

@@ -8,58 +8,21 @@ a unit, as in ``0.127 mm``; bare ones are in the option's.
 import functools
 from collections.abc import Callable, Iterable, Mapping
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import click
 from click.shell_completion import CompletionItem
 
+from chaosgym.cli.options import Quantity
 from chaosgym.cli.output import AS_JSON, note_machine
 from chaosgym.errors import ParameterError
 from chaosgym.machines import FILE_ENDING, MACHINES
-from chaosgym.machines.machine import Choice, Number, Option
+
+if TYPE_CHECKING:
+    from chaosgym.machines.machine import Number, Option
 
 START_CYCLES = 32
 """Cycles from rest by which the box of random initial states is scaled."""
-
-BASE = {"mm": "m", "arcmin": "rad"}
-"""Unit of the field behind an option, where it is another than the option's."""
-
-
-class Quantity(click.ParamType):  # type: ignore[type-arg]
-    """A number in the unit ``bare``, or with a unit that can be turned into it."""
-
-    name = "quantity"
-
-    def __init__(self, bare: str) -> None:
-        self.bare = bare
-
-    def get_metavar(self, param: click.Parameter, ctx: click.Context) -> str:
-        """Return the unit of a bare number."""
-        return "NUMBER" if self.bare == "-" else f"NUMBER [{self.bare}]"
-
-    def convert(self, value: Any, param: click.Parameter | None, ctx: click.Context | None) -> float:
-        """Return the number in the option's unit."""
-        from chaosgym.units import parse_option, units_of
-
-        if not isinstance(value, str):
-            return float(value)
-        base = BASE.get(self.bare, self.bare)
-        try:
-            found = parse_option(param.opts[0] if param else "value", value, base, "" if base == "-" else self.bare)
-        except ParameterError as error:
-            raise click.UsageError(str(error), ctx) from error
-        return found / units_of(base).get(self.bare, 1.0)
-
-
-class FloatRange(click.FloatRange):
-    """A number in a range; click takes nan into any."""
-
-    def convert(self, value: Any, param: click.Parameter | None, ctx: click.Context | None) -> float:
-        """Return the number."""
-        found = float(super().convert(value, param, ctx))
-        if found != found:
-            self.fail(f"{value!r} is no number.", param, ctx)
-        return found
 
 
 def millimetres_meant(field: str, written: str, value: float, usual: float) -> str:
@@ -97,7 +60,7 @@ class MachineName(click.ParamType):  # type: ignore[type-arg]
 
 
 class MachineCommand(click.Command):
-    """A command whose options are those of the machine that is named on its line; of all of them in its help.
+    """A command with the options of the machine that is named on its line.
 
     ``before`` is called with the arguments before the machine is imported.
     """
@@ -111,24 +74,36 @@ class MachineCommand(click.Command):
         if self._before is not None:
             self._before(args)
         named = [argument for argument in args if argument in MACHINES][:1]
-        ctx.meta[__name__] = named or list(MACHINES)
+        ctx.meta[__name__] = named
         try:
             return super().parse_args(ctx, args)
         except click.NoSuchOption as error:
-            if named and error.option_name in _options_of(MACHINES):
+            if error.option_name not in _options_of(MACHINES):
+                raise
+            message = f"{error.option_name} is an option of a machine; name it: {', '.join(MACHINES)}, or its file"
+            if named:
                 known = ", ".join(MACHINES[named[0]].options)
                 message = f"{error.option_name} is no option of {named[0]}; it takes {known} and --set FIELD=VALUE"
-                raise click.UsageError(message, ctx) from error
-            raise
+            raise click.UsageError(message, ctx) from error
 
     def get_params(self, ctx: click.Context) -> list[click.Parameter]:
         """Return the command's own parameters and the machine's."""
-        offered = _options_of(ctx.meta.get(__name__, MACHINES))
-        return [*offered.values(), *super().get_params(ctx)]
+        return [*_options_of(ctx.meta.get(__name__, ())).values(), *super().get_params(ctx)]
+
+    def format_epilog(self, ctx: click.Context, formatter: click.HelpFormatter) -> None:
+        """Say where the options of a machine are, if none is named."""
+        super().format_epilog(ctx, formatter)
+        if not ctx.meta.get(__name__):
+            formatter.write_paragraph()
+            formatter.write_text(f"A machine has options of its own: {ctx.command_path} MACHINE --help")
 
 
 def _options_of(machines: Iterable[str]) -> dict[str, click.Option]:
     """Options of some machines by name; the help says whose each is."""
+    if not machines:
+        return {}
+    from chaosgym.machines.machine import Choice
+
     owners: dict[str, list[str]] = {}
     kinds: dict[str, Option] = {}
     for machine in machines:
@@ -225,6 +200,7 @@ def build_machine(name: str, given: Mapping[str, Any], settings: tuple[str, ...]
     click.UsageError
         If an option is not the machine's, or its value is not allowed; names option, value and range.
     """
+    from chaosgym.machines.machine import Choice
     from chaosgym.machines.parameters import with_settings
 
     owner = MACHINES[name]
@@ -261,7 +237,7 @@ def build_machine(name: str, given: Mapping[str, Any], settings: tuple[str, ...]
     return machine
 
 
-def _checked(owner: Any, option: str, number: Number, value: float) -> float:
+def _checked(owner: Any, option: str, number: "Number", value: float) -> float:
     """SI value of a number option; the message speaks of the option in its own unit."""
     from chaosgym.machines.parameters import check_parameter, parameters_of
 

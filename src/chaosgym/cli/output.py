@@ -38,17 +38,39 @@ def note_machine(machine: Any) -> None:
     kept += [note for note in machine.notes if note not in kept]
 
 
-def emit(result: Mapping[str, Any], as_json: bool, lines: Callable[[], list[str]]) -> None:
+def emit(
+    result: Mapping[str, Any],
+    as_json: bool,
+    lines: Callable[[], list[str]],
+    picture: Path | None = None,
+    figure: "Callable[[Any], Figure] | None" = None,
+) -> None:
     """Print the result as JSON, or the lines for people; end quietly if nobody reads them.
 
-    Both end with the notes on the machines of the command, if there are any.
+    Both end with the picture, if one was asked for, and with the notes on the machines of the command. ``figure`` is
+    given the module ``plotting.commands`` and makes the picture.
     """
+    if picture is not None and figure is not None:
+        _save(figure, picture)
+        _print({**result, "plot": str(picture)}, as_json, lambda: [*lines(), f"picture: {picture}"])
+    else:
+        _print(result, as_json, lines)
+
+
+def _save(figure: "Callable[[Any], Figure]", path: Path) -> None:
+    from chaosgym.plotting import commands
+    from chaosgym.plotting.style import save_picture
+
+    save_picture(figure(commands), path)
+
+
+def _print(result: Mapping[str, Any], as_json: bool, lines: Callable[[], list[str]]) -> None:
     context = click.get_current_context(silent=True)
     notes = context.meta.get(NOTES, ()) if context else ()
     try:
-        told = {**result, "notes": list(notes)} if notes else result
+        shown = {**result, "notes": list(notes)} if notes else result
         for line in (
-            [json.dumps(told, allow_nan=False)] if as_json else [*lines(), *(f"note: {note}" for note in notes)]
+            [json.dumps(shown, allow_nan=False)] if as_json else [*lines(), *(f"note: {note}" for note in notes)]
         ):
             click.echo(line, nl=False)  # Python overlooks that a single large write was cut off; the next one is not
             click.echo()
@@ -132,18 +154,6 @@ def picture_path(plot: str | None, stem: str, formats: tuple[str, ...] | None = 
     from chaosgym.plotting.style import FORMATS, check_picture, free_name
 
     return free_name(stem) if plot == UNNAMED else check_picture(Path(plot), formats or FORMATS)
-
-
-def draw(path: Path | None, figure: Callable[[Any], "Figure"], result: dict[str, Any], lines: list[str]) -> None:
-    """Save the figure, if one was asked for, and say where; ``figure`` is given the module ``plotting.commands``."""
-    if path is None:
-        return
-    from chaosgym.plotting import commands
-    from chaosgym.plotting.style import save_picture
-
-    save_picture(figure(commands), path)
-    result["plot"] = str(path)
-    lines.append(f"picture: {path}")
 
 
 def check_target(path: str | Path, overwrite: bool) -> None:

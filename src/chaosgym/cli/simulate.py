@@ -8,7 +8,7 @@ import click
 import numpy as np
 
 from chaosgym.cli.machine_options import machine_command
-from chaosgym.cli.output import AS_JSON, check_target, draw, emit, picture_path, plot_option, write_table
+from chaosgym.cli.output import AS_JSON, check_target, emit, picture_path, plot_option, write_table
 
 
 @machine_command
@@ -88,8 +88,7 @@ def simulate(
         *(f"written to {path}" for path in result["files"]),
         f"computing time            {1e6 * seconds_per_cycle:.0f} us per cycle",
     ]
-    draw(picture, lambda plots: plots.simulation_figure(record, transient), result, lines)
-    emit(result, as_json, lambda: lines)
+    emit(result, as_json, lambda: lines, picture, lambda plots: plots.simulation_figure(record, transient))
 
 
 def _largest(sensor_peak: Any) -> list[float]:
@@ -146,9 +145,7 @@ def show(machine: Any, markdown: bool, plot: str | None, as_json: bool) -> None:
                 rows.append(f"{len(names)} {name.replace('_', ' ')}: {', '.join(names)}")
         return [*rows, *(() if drive is None else drive.told), *(() if motor is None else (motor.told,))]
 
-    drawn: list[str] = []
-    draw(picture, lambda plots: plots.machine_figure(machine), result, drawn)
-    emit(result, as_json, lambda: lines() + drawn)
+    emit(result, as_json, lines, picture, lambda plots: plots.machine_figure(machine))
 
 
 @click.command("new-machine")

@@ -7,7 +7,7 @@ import click
 
 from chaosgym.cli import Group
 from chaosgym.cli.machine_options import machine_command, millimetres_meant
-from chaosgym.cli.output import AS_JSON, WORKERS, draw, emit, picture_path, plot_option
+from chaosgym.cli.output import AS_JSON, WORKERS, emit, picture_path, plot_option
 
 
 @machine_command
@@ -120,8 +120,7 @@ def sweep(
         told, more = _routes(plan, labelled)
         result |= told
         lines += more
-    draw(picture, lambda plots: plots.response.sweep_map(labelled), result, lines)
-    emit(result, as_json, lambda: lines)
+    emit(result, as_json, lambda: lines, picture, lambda plots: plots.response.sweep_map(labelled))
 
 
 def _routes(plan: Any, labelled: Any) -> tuple[dict[str, Any], list[str]]:

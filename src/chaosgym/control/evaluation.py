@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 
 from chaosgym.control.comparison import Contenders, job_rows, joined, shipped_comparison
 from chaosgym.control.policies.policy import TrainedPolicy, load_policy
+from chaosgym.control.readings import Readings
 from chaosgym.control.rollout import Played, Policy, play
 from chaosgym.control.scores import ONE, ZERO, Scores
 from chaosgym.envs.memory import SpeedMemory
@@ -60,11 +61,13 @@ class _Function:
         self._function, self.keywords = function, keywords
 
     def start(self, envs: Any) -> None:
-        """Nothing is remembered."""
+        """Nothing is remembered but what is held without a reading."""
+        self._readings = Readings(envs.task, envs.num_envs)
 
     def __call__(self, observations: Any) -> Any:
         """Actions, one call for each job."""
-        return np.array([self._function(observation) for observation in observations])
+        seen = self._readings.take(observations)
+        return self._readings.answer([self._function(observation) for observation in seen])
 
 
 class _SB3:
@@ -80,6 +83,7 @@ class _SB3:
     def start(self, envs: Any) -> None:
         """Forget the last jobs."""
         self._state, self._first = None, np.ones(envs.num_envs, np.bool_)
+        self._readings = Readings(envs.task, envs.num_envs)
         width = self._model.observation_space.shape[0]
         self._memory = None
         if width != envs.single_observation_space.shape[0]:
@@ -95,11 +99,12 @@ class _SB3:
 
     def __call__(self, observations: NDArray[np.float32]) -> Any:
         """Actions without exploration."""
+        observations = self._readings.take(observations)
         seen = observations if self._memory is None else self._memory.add(observations)
         seen = seen if self._normalise is None else self._normalise.normalize_obs(seen)
         actions, self._state = self._model.predict(seen, self._state, self._first, deterministic=True)
         self._first = np.zeros(len(actions), np.bool_)
-        return actions
+        return self._readings.answer(actions)
 
 
 def policy_of(given: Any, **keywords: Any) -> Policy:

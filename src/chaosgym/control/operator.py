@@ -12,7 +12,9 @@ from numpy.typing import ArrayLike, NDArray
 from chaosgym.arrays import Array
 from chaosgym.control.controllers import Controller
 from chaosgym.control.evaluation import policy_of
+from chaosgym.control.guard import GuardedPolicy
 from chaosgym.control.policies.learned_map import LearnedMap
+from chaosgym.control.readings import FIRST_FELT, usable
 from chaosgym.core.compilation import call
 from chaosgym.envs.drive import DEAD_BAND, MOVES, checked_actions
 from chaosgym.envs.kernels.steps import drive, observe
@@ -40,6 +42,11 @@ class Operator:
         Id of an environment, or the file of a machine: range of speed, slew limit and sensors are its task's.
     keywords
         Of the environment.
+
+    Attributes
+    ----------
+    lost
+        Steps since the start that had no usable reading.
 
     Raises
     ------
@@ -74,12 +81,17 @@ class Operator:
                 f"an operator observes the {len(OBSERVATION_NAMES)} usual entries; allowed: a policy and keywords "
                 f"without {', '.join(entry.name for entry in self.task.added)}"
             )
-        self.demand = float("nan")
+        self.demand, self.lost = float("nan"), 0
+
+    @property
+    def foreign(self) -> bool | None:
+        """Whether the machine is foreign to a guarded policy; None without a guard."""
+        return not self.policy.trusted[0] if isinstance(self.policy, GuardedPolicy) else None
 
     @property
     def speed(self) -> float:
         """Speed that the machine is to run at, in the unit of the machine's speed field."""
-        return float(self._job["speed"][0])
+        return float(self._job["set_point"][0])
 
     def start(self, *, speed: float, demand: float) -> float:
         """Begin at a speed, with a demand, and drop earlier measurements; the first ``next`` gives those at this speed.
@@ -95,7 +107,7 @@ class Operator:
         job["speed"] = job["set_point"] = self._within("speed", speed)
         job["done"] = BEFORE_THE_FIRST
         demand = self._within("demand", demand)
-        self._job[:] = job
+        self._job[:], self.lost = job, 0
         self._ask(demand)
         self._job["changed"] = 0
         self.policy.start(self._envs)
@@ -108,19 +120,24 @@ class Operator:
         demand: float | None = None,
         impacts: float | None = None,
         bouncing: float | None = None,
+        speed: float | None = None,
     ) -> float:
         """Return the speed of the next step, after a step at ``speed``.
 
         Parameters
         ----------
         peaks : (cycles,)
-            Largest force of each operating cycle of the step [N], five cycles or more.
+            Largest force of each operating cycle of the step [N], five cycles or more. The longest stretch of finite
+            ones is the reading; if it is shorter than five cycles the step has none. Without a reading the trim is
+            held for two steps, and the demand followed from the third one on.
         demand
             Of the next step; by default that of the last one.
         impacts
             Contacts counted in a cycle, mean over the step. Trained policies look at it.
         bouncing
             Share of the half cycle spent bouncing on one side, from 0 to 1. Trained policies look at it.
+        speed
+            That the machine had in the step, as measured; by default, or if it is not finite, the one that was set.
 
         Raises
         ------
@@ -133,21 +150,24 @@ class Operator:
             felt = np.asarray(peaks, float)
         except (TypeError, ValueError):
             raise ParameterError(f"peaks = {peaks!r} are no numbers; allowed: {FEWEST} or more forces [N]") from None
-        if felt.ndim != 1 or len(felt) < FEWEST or not np.isfinite(felt).all() or felt.min() < 0.0:
+        if felt.ndim != 1 or len(felt) < FEWEST or (felt < 0.0).any():
             raise ParameterError(
-                f"peaks of shape {felt.shape} are not usable; allowed: {FEWEST} or more finite forces from 0 N on"
+                f"peaks of shape {felt.shape} are not usable; allowed: {FEWEST} or more forces from 0 N on"
             )
-        looks = isinstance(self.policy, LearnedMap) or not isinstance(self.policy, Controller)
+        inner = self.policy.policy if isinstance(self.policy, GuardedPolicy) else self.policy
+        looks = isinstance(inner, LearnedMap) or not isinstance(inner, Controller)
         if looks and (impacts is None or bouncing is None):
             raise ParameterError("a trained policy looks at impacts and bouncing too; give both, or use Kriging()")
         for name, value, high in (("impacts", impacts, np.inf), ("bouncing", bouncing, 1.0)):
-            if value is not None and not 0.0 <= value <= high:
+            if value is not None and (value < 0.0 or value > high):
                 raise ParameterError(f"{name} = {value!r} is out of range; allowed: 0 to {high:g}")
         if demand is not None:
             self._within("demand", demand)
         self._count_a_step()
         self._ask(self.demand if demand is None else demand)
+        self._job["speed"] = self._job["set_point"] if speed is None or not np.isfinite(speed) else speed
         observation = self._observed(felt, impacts or 0.0, bouncing or 0.0)
+        self.lost += int(not usable(observation, self.task)[0])
         actions = checked_actions(self.task, self.policy(observation), 1)
         call(drive, self.task.numbers, actions, MOVES, DEAD_BAND, _FIRST, self._envs.jobs.demand, self._job)
         return self.speed
@@ -173,7 +193,12 @@ class Operator:
         return float(value)
 
     def _observed(self, peaks: Array, impacts: float, bouncing: float) -> NDArray[np.float32]:
-        """Observation (1, 14) of readings, which have their errors already."""
+        """Observation (1, 14) of readings, which have their errors already; not a number where there is none."""
+        peaks = _longest_finite(peaks)
+        if len(peaks) < FEWEST or not np.isfinite([impacts, bouncing]).all():
+            values = self._observed(np.ones(FEWEST), 0.0, 0.0)
+            values[:, FIRST_FELT:] = np.nan
+            return values
         space, cycles = self._envs.settings.space, len(peaks)
         period = np.array([float(self._envs.nominal.period_at(self.speed))])
         duration = np.full((1, cycles, 1), 0.5 * bouncing * period[0])
@@ -182,3 +207,11 @@ class Operator:
         drawn = (np.full((1, cycles + 1), 0.5), np.array([impacts * cycles]))
         call(observe, *given, *drawn, space.low, space.high, np.empty((1, cycles)), values)
         return values
+
+
+def _longest_finite(peaks: Array) -> Array:
+    """The longest stretch of finite peaks, since peaks are compared with those of cycles before."""
+    bad = np.flatnonzero(~np.isfinite(peaks))
+    edges = np.array([-1, *bad, len(peaks)])
+    first = int(np.diff(edges).argmax())
+    return peaks[edges[first] + 1 : edges[first + 1]]

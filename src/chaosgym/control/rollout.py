@@ -6,8 +6,9 @@ Everybody who plays machine k meets the same machine, demand and disturbance. Th
 comparison, demo and pictures.
 """
 
+import warnings
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any, Protocol
 
 import numpy as np
@@ -86,6 +87,13 @@ class Played:
     hours: Array
     status: NDArray[np.int64]
     cycles_per_step: int
+
+    def job(self, place: int) -> "Played":
+        """Return one of the jobs alone, by its place among them."""
+        one, every = slice(place, place + 1), vars(self)
+        last = {name: every[name][one] for name in every if np.ndim(every[name]) == 1}
+        second = {name: every[name][:, one] for name in every if np.ndim(every[name]) > 1}
+        return replace(self, **last, **second)
 
     @property
     def returns(self) -> Array:
@@ -192,7 +200,10 @@ def play(
     status = np.zeros(count, np.int64)
     runs = np.ones(count, np.bool_)
     for step in trange(steps, desc=progress, unit="step", disable=progress is None, leave=False):
-        observations, rewards, ended, _, info = envs.step(policy(observations))
+        actions = policy(observations)
+        with warnings.catch_warnings():
+            warnings.filterwarnings("ignore", "options .* held for the jobs")  # what begins after a job is not counted
+            observations, rewards, ended, _, info = envs.step(actions)
         kept["reward"][step, runs] = rewards[runs]
         for name in ("speed", "demand", "type_iii"):
             kept[name][step, runs] = info[name][runs]

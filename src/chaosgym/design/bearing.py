@@ -172,29 +172,28 @@ def variation_region(
 ) -> dict[str, Tolerance]:
     """Region over which the parameters vary (thesis 5.5.2).
 
-        Parameters
-        ----------
-        machine
-            The nominal machine.
-        tolerances
-            By field.
-        region
-            1 or 2 tolerances on either side.
-        wear
-            Give the clearance two tolerances whatever the region, because bearings wear.
+    Parameters
+    ----------
+    machine
+        The nominal machine.
+    tolerances
+        By field.
+    region
+        1 or 2 tolerances on either side.
+    wear
+        Give the clearance two tolerances whatever the region, because bearings wear.
 
-        Raises
-        ------
-        ParameterError
-            If ``region`` is not 1 or 2, or wear is to be considered and the clearance has no tolerance.
+    Raises
+    ------
+    ParameterError
+        If ``region`` is not 1 or 2, or wear is to be considered and the clearance has no tolerance.
 
-        Examples
-        --------
-        >>> from chaosgym.design import variation_region
-        >>> from chaosgym.design.told import listed
-    from chaosgym.diagnosis import Tolerance
-        >>> variation_region(chaosgym.ImpactBeam(), {"clearance": Tolerance(0.1)}, region=2)
-        {'clearance': Tolerance(value=0.2100000000000002, relative=True)}
+    Examples
+    --------
+    >>> from chaosgym.design import variation_region
+    >>> from chaosgym.diagnosis import Tolerance
+    >>> variation_region(chaosgym.ImpactBeam(), {"clearance": Tolerance(0.1)}, region=2)
+    {'clearance': Tolerance(value=0.2100000000000002, relative=True)}
     """
     if region not in (1, 2):
         raise ParameterError(f"region = {shown(region)} is out of range; allowed: 1 or 2 tolerances")

@@ -16,6 +16,7 @@ from chaosgym.errors import DesignError
 from chaosgym.machines.parameters import quantity_of
 from chaosgym.recordings.judge import judge_peaks
 from chaosgym.recordings.measured_verdict import MeasuredVerdict
+from chaosgym.recordings.runs import Run
 
 FOLLOWS = {
     "periodic": "every cycle loads the surface alike, so that the life follows from one period",
@@ -179,3 +180,25 @@ def evaluate_peaks(
         evaluate(time_blocks(values), criteria, "statistics of the measured peak forces"),
         source,
     )
+
+
+def evaluate_run(run: Run, criteria: Criteria, *, date: str = "") -> MeasuredPeaks:
+    """Evaluate a recording of forces, with its file as the source.
+
+    Parameters
+    ----------
+    run
+        Of a column of forces.
+    criteria
+        What is asked of the bearing.
+    date
+        Of the evaluation, for the report.
+    """
+    source = {
+        "file": run.source,
+        "sha256": run.sha256,
+        "column": run.name,
+        "date": date,
+        "read as": "; ".join(run.notes).removeprefix("read "),
+    }
+    return evaluate_peaks(run.peaks, criteria, verdict=run.verdict, source=source)

@@ -69,19 +69,6 @@ def as_forces(forces: ArrayLike, minimum: int = 1) -> Array:
     return values
 
 
-def summary(values: ArrayLike) -> dict[str, float]:
-    """Smallest, largest, mean and standard deviation of readings, for people and JSON.
-
-    Examples
-    --------
-    >>> from chaosgym.design.statistics import summary
-    >>> summary([1.0, 2.0, 3.0])
-    {'min': 1.0, 'max': 3.0, 'mean': 2.0, 'std': 0.816496580927726}
-    """
-    readings = np.asarray(values, dtype=float)
-    return {name: float(getattr(readings, name)()) for name in ("min", "max", "mean", "std")}
-
-
 @dataclass(frozen=True)
 class RunningStatistics:
     """Mean and standard deviation of the first n cycles, in the unit of the force; all arrays (cycles,)."""

@@ -171,30 +171,29 @@ def _share(share: float | None) -> str:
 def signs_of_chaos(verdict: MachineDiagnosis) -> tuple[Sign, ...]:
     """Signs of chaos on a machine's response, with how often each was right on the dataset of its kind.
 
-        Parameters
-        ----------
-        verdict
-            Of ``diagnose``: it carries the run and the machine. Precursors are looked for on periodic responses only.
+    Parameters
+    ----------
+    verdict
+        Of ``diagnose``: it carries the run and the machine. Precursors are looked for on periodic responses only.
 
-        Returns
-        -------
-        tuple of Sign
-            The printed criteria, if the thesis gives any for the machine; then the precursors.
+    Returns
+    -------
+    tuple of Sign
+        The printed criteria, if the thesis gives any for the machine; then the precursors.
 
-        Raises
-        ------
-        DiagnosisError
-            If the verdict was reached on a plain series.
+    Raises
+    ------
+    DiagnosisError
+        If the verdict was reached on a plain series.
 
-        Examples
-        --------
-        >>> from chaosgym import diagnose
-        >>> from chaosgym.diagnosis import signs_of_chaos
-        >>> from chaosgym.diagnosis.verdict import MachineDiagnosis
-    from chaosgym.machines import ImpactBeam
-        >>> verdict = diagnose(ImpactBeam(excitation_frequency=12.0))
-        >>> [(sign.name, sign.present) for sign in signs_of_chaos(verdict)]
-        [('criteria', False), ('period doubling', False), ('period three', False), ('long bouncing', False)]
+    Examples
+    --------
+    >>> from chaosgym import diagnose
+    >>> from chaosgym.diagnosis import signs_of_chaos
+    >>> from chaosgym.machines import ImpactBeam
+    >>> verdict = diagnose(ImpactBeam(excitation_frequency=12.0))
+    >>> [(sign.name, sign.present) for sign in signs_of_chaos(verdict)]
+    [('criteria', False), ('period doubling', False), ('period three', False), ('long bouncing', False)]
     """
     machine = verdict.run.machine
     rates = measured_rates().get(machine.name, {})

@@ -10,6 +10,7 @@ Three encodings of an action set the same trim:
 Each encoding can hold a speed exactly, because motion settles only at a speed that is held.
 """
 
+import warnings
 from typing import Any
 
 import numpy as np
@@ -41,7 +42,8 @@ def action_space(task: Task) -> "Box | Discrete[Any]":
 def checked_actions(task: Task, actions: Any, count: int) -> Array:
     """Return the actions of ``count`` machines as an array (count, n).
 
-    A number that stands alone may be an array of one, and a whole one may be a float: libraries hand on both.
+    A number that stands alone may be an array of one, and a whole one may be a float: libraries hand on both. What lies
+    outside the box is warned of, and clipped by the drive.
 
     Raises
     ------
@@ -59,4 +61,11 @@ def checked_actions(task: Task, actions: Any, count: int) -> Array:
     width = 2 if task.action == "continuous" else 1
     if given.shape != (count, width) or given.dtype.kind not in "iuf" or not np.isfinite(given).all():
         raise ParameterError(f"action = {actions!r} is not usable; allowed: {width} finite numbers for each machine")
+    low, high = (-1.0, 1.0) if task.action == "continuous" else (task.lowest_speed, task.highest_speed)
+    rounding = 1e-6 * (high - low)
+    if given.min() < low - rounding or given.max() > high + rounding:
+        warnings.warn(
+            f"actions outside the box are clipped; allowed with action={task.action!r}: {low:g} to {high:g}",
+            stacklevel=3,
+        )
     return given.astype(float)

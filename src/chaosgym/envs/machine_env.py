@@ -5,6 +5,7 @@ motion goes on from the state in which the last step ended.
 """
 
 from collections.abc import Mapping
+from copy import deepcopy
 from dataclasses import replace
 from typing import TYPE_CHECKING, Any, cast
 
@@ -182,7 +183,7 @@ class JobSpec:
 
     @spec.setter
     def spec(self, given: EnvSpec | None) -> None:
-        self._spec = given
+        self._spec = None if given is None else replace(given, kwargs=deepcopy(given.kwargs))
 
 
 class MachineEnv(JobSpec, gym.Env[Observation, Any]):

@@ -109,6 +109,15 @@ class SpeedMemory:
         usual = [f"{name}_{when}" for when in ("unusual", "unusual_on_average") for name in COMPARED]
         return (*past, *around, *usual)
 
+    def unusual(self, observations: Array) -> Array:
+        """How far readings lie from what is usual at their speed, in standard deviations, (k, 3), of (k, entries)."""
+        return self.usual.deviation(self._place(observations), observations[:, _COMPARED], self._floor)
+
+    def _place(self, observations: Array) -> NDArray[np.int64]:
+        """Places of the speeds of observations (k, entries), (k,)."""
+        near = np.rint((observations[:, PLACE.speed] - self._lowest) / self._spacing)
+        return near.astype(np.int64).clip(0, self._felt.shape[1] - 1)
+
     def forget(self, jobs: NDArray[np.bool_]) -> None:
         """Forget the jobs that a mask (N,) marks."""
         for values in (self._felt, self._seen, self._past, self._last, self._sum, self._weight):
@@ -122,8 +131,7 @@ class SpeedMemory:
         """As ``add``, for the jobs that a mask (N,) marks: (k, entries + m) for observations (N, entries)."""
         every = np.flatnonzero(jobs)
         seen = observations[every].astype(float)
-        top = self._felt.shape[1] - 1
-        place = np.rint((seen[:, PLACE.speed] - self._lowest) / self._spacing).astype(np.int64).clip(0, top)
+        place = self._place(seen)
         felt = irregularity(seen)
         before = self._felt[every, place]
         self._felt[every, place] = np.where(self._seen[every, place] > 0.0, 0.5 * (before + felt), felt)
@@ -133,7 +141,7 @@ class SpeedMemory:
         values = seen[:, _COMPARED]
         if self.learns:
             self.usual.add(place, values)
-        unusual = self.usual.deviation(place, values, self._floor)
+        unusual = self.unusual(seen)
         weight = np.where(felt < 1.2 * self._noise, 1.0, 0.2)[:, None]
         self._sum[every] += weight * unusual
         self._weight[every] += weight

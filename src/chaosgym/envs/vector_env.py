@@ -5,6 +5,7 @@ envs = gym.make_vec("chaosgym/ImpactBeam-v1", num_envs=256)
 Every sub-environment does what a single environment with its seed does, bit for bit, and has a generator of its own.
 """
 
+import warnings
 from collections.abc import Callable, Mapping, Sequence
 from typing import TYPE_CHECKING, Any, cast
 
@@ -104,6 +105,7 @@ class MachineVectorEnv(JobSpec, gym.vector.VectorEnv[Observation, Actions, NDArr
         self._elapsed = np.zeros(num_envs, np.int64)
         self._needs_reset = np.ones(num_envs, np.bool_)
         self._has_begun = False
+        self._options: tuple[str, ...] = ()
         self.num_envs = num_envs
         self.autoreset_mode = AutoresetMode(autoreset_mode)
         self.metadata = {**METADATA, "render_modes": ["rgb_array"], "autoreset_mode": self.autoreset_mode}
@@ -123,7 +125,8 @@ class MachineVectorEnv(JobSpec, gym.vector.VectorEnv[Observation, Actions, NDArr
             One for each sub-environment, or s for s, s + 1, s + 2, ...
         options
             As for the single environment, with ``"machine"`` one number or (num_envs,), and ``"reset_mask"``:
-            (num_envs,) bool.
+            (num_envs,) bool. They hold for the jobs that begin here: a job after an autoreset draws its machine and
+            starts below its demand, which is warned of.
 
         Raises
         ------
@@ -134,6 +137,7 @@ class MachineVectorEnv(JobSpec, gym.vector.VectorEnv[Observation, Actions, NDArr
         which = self._masked(options.pop("reset_mask", None))
         seeds = self._seeds(seed)
         start = start_of(self.settings, options, self.num_envs)
+        self._options = tuple(options)
         observation, info = self._start(which, [seeds[i] for i in which.tolist()], *start)
         if not self._has_begun:
             self._last = np.zeros(cast(tuple[int, ...], self.observation_space.shape), np.float32)
@@ -173,7 +177,7 @@ class MachineVectorEnv(JobSpec, gym.vector.VectorEnv[Observation, Actions, NDArr
             self._take_in(running, info, outcome.observation)
             self._report(infos, observations, running, info, terminated | truncated)
         if len(over):
-            observations[over], info = self._start(over, [None] * len(over))
+            observations[over], info = self._start_anew(over)
             self._add(infos, over, info)
         self._last = observations
         return observations.copy(), rewards, terminated, truncated, infos
@@ -196,8 +200,19 @@ class MachineVectorEnv(JobSpec, gym.vector.VectorEnv[Observation, Actions, NDArr
         if len(fresh) < self.num_envs:
             going = np.flatnonzero(~ended)
             self._add(infos, going, {name: values[going] for name, values in info.items()})
-        observations[fresh], started = self._start(fresh, [None] * len(fresh))
+        observations[fresh], started = self._start_anew(fresh)
         self._add(infos, fresh, started)
+
+    def _start_anew(self, which: Indices) -> tuple[Observation, dict[str, Any]]:
+        """Start jobs after an autoreset; the options of the reset before do not hold for them."""
+        if self._options:
+            warnings.warn(
+                f"options {', '.join(self._options)} held for the jobs that reset() began, not for those after an "
+                "autoreset; with autoreset_mode='Disabled' every reset takes options",
+                stacklevel=4,
+            )
+            self._options = ()
+        return self._start(which, [None] * len(which))
 
     def _start(
         self,
@@ -279,9 +294,12 @@ class MachineVectorEnv(JobSpec, gym.vector.VectorEnv[Observation, Actions, NDArr
             return [None] * self.num_envs
         if isinstance(seed, int | np.integer):
             return [int(seed) + i for i in range(self.num_envs)]
-        if len(seed) != self.num_envs:
-            raise ParameterError(f"seed has {len(seed)} entries; allowed: one number, or {self.num_envs}")
-        return seed
+        seeds = list(seed) if np.ndim(seed) == 1 else []
+        if len(seeds) != self.num_envs or not all(one is None or isinstance(one, int | np.integer) for one in seeds):
+            raise ParameterError(
+                f"seed = {seed!r} is not usable; allowed: one whole number, or {self.num_envs} whole numbers or None"
+            )
+        return seeds
 
     def get_attr(self, name: str) -> tuple[Any, ...]:
         """Return an attribute of each sub-environment: its own (speed, machine, np_random) or one that all share.

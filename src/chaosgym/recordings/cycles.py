@@ -10,12 +10,13 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from chaosgym.arrays import Array
-from chaosgym.errors import DiagnosisError
+from chaosgym.errors import DiagnosisError, ParameterError
 from chaosgym.recordings.columns import Signal, choose_force, named_column
+from chaosgym.recordings.description import Sampled
 from chaosgym.recordings.read import Recording
 from chaosgym.recordings.sampling import Sampling, sampling
 from chaosgym.recordings.tachometer import Turns, turns_of
-from chaosgym.units import duration
+from chaosgym.units import ALTERNATIVES, duration, parse_quantity
 
 FEWEST_SAMPLES = 8
 """Samples that a cycle must have."""
@@ -48,6 +49,8 @@ class CyclePeaks:
         How the cycle is known, what is missing, and doubts.
     condition
         "if the cycle is 49.4 ms" where it was estimated; empty where it is known.
+    sampled
+        Samples a cycle and cycles a second; None with a tachometer.
     """
 
     peaks: Array
@@ -56,25 +59,27 @@ class CyclePeaks:
     period: float
     notes: tuple[str, ...]
     condition: str = ""
+    sampled: Sampled | None = None
 
 
-def cycle_period(rpm: float | None, hz: float | None, period_s: float | None) -> float | None:
-    """Operating cycle [s] from whichever was stated; None if none was.
+def cycle_period(text: str) -> float:
+    """Operating cycle [s] of a text: cycles a second or a minute, or the time of one.
 
     Raises
     ------
-    DiagnosisError
-        If several were stated, or one is not above 0.
+    ParameterError
+        If it is no quantity in such a unit, or not above 0.
+
+    Examples
+    --------
+    >>> from chaosgym.recordings.cycles import cycle_period
+    >>> [round(cycle_period(text), 12) for text in ("20 Hz", "1200 rpm", "50 ms")]
+    [0.05, 0.05, 0.05]
     """
-    stated = {"--rpm": rpm, "--hz": hz, "--period-s": period_s}
-    given = {name: value for name, value in stated.items() if value is not None}
-    if len(given) > 1:
-        raise DiagnosisError(f"{' and '.join(given)} both state the cycle; allowed: one of them")
-    for name, value in given.items():
-        if not (math.isfinite(value) and value > 0.0):
-            raise DiagnosisError(f"{name} = {value:g} is out of range; allowed: above 0")
-        return value if name == "--period-s" else (60.0 if name == "--rpm" else 1.0) / value
-    return None
+    value = parse_quantity("cycle", text, "s", {**ALTERNATIVES["Hz"], **ALTERNATIVES["s"]})
+    if value <= 0.0:
+        raise ParameterError(f"cycle = {text!r} is out of range; allowed: above 0")
+    return 1.0 / value if text.rstrip().endswith(tuple(ALTERNATIVES["Hz"])) else value
 
 
 def estimated_period(value: Array, step: float) -> float:
@@ -96,7 +101,9 @@ def estimated_period(value: Array, step: float) -> float:
     power[: 4 * 3] = 0.0
     peak = int(np.argmax(power))
     if power[peak] < 30.0 * float(np.mean(power)):
-        raise DiagnosisError("no line of the spectrum stands out, so the cycle can't be estimated; use --hz or --rpm")
+        raise DiagnosisError(
+            "no line of the spectrum stands out, so the cycle can't be estimated; state it: --cycle '30 Hz'"
+        )
     best = peak
     for divisor in (2, 3, 4, 5):
         place = round(peak / divisor)
@@ -183,7 +190,7 @@ def cycle_peaks(
         cycle = estimated_period(value, instants.step)
         condition = f"if the cycle is {duration(cycle)}"
         notes.append(
-            f"cycle estimated from the spectrum: {duration(cycle, 6)} ({1.0 / cycle:.5g} Hz); state it (--hz, --rpm) "
+            f"cycle estimated from the spectrum: {duration(cycle, 6)} ({1.0 / cycle:.5g} Hz); state it (--cycle) "
             "if that is not the speed"
         )
     else:
@@ -206,7 +213,8 @@ def cycle_peaks(
         notes.append(f"{dropped} cycles left out: samples are missing")
     if len(peaks) == 0:
         raise DiagnosisError(f"the series holds no whole cycle of {duration(cycle)}")
-    return CyclePeaks(peaks, kept, spread, cycle, tuple(notes), condition)
+    sampled = Sampled(cycle / instants.step, 1.0 / cycle) if turns is None else None
+    return CyclePeaks(peaks, kept, spread, cycle, tuple(notes), condition, sampled)
 
 
 def _filled(value: Array) -> Array:

@@ -1,7 +1,8 @@
 r"""The nature of a measured record: one answer from peaks and the sensor's error, or "undetermined".
 
 1. Single wrong readings are replaced and missing cycles filled in; both are reported.
-2. A record of two regimes is cut, and each part judged; chaos in one part counts, as in the Two-Step Test.
+2. A record of two regimes is cut, and each part judged; chaos in one part counts, as in the Two-Step Test, if more
+   cycles are accounted for than not. Nothing but a fixed motion is claimed of a whole across a change.
 3. What repeats exactly is periodic. What scatters is compared with the stated error. Without one the scatter itself is
    judged: a sensor's is random from cycle to cycle and small, chaos can be forecast from what came before.
 4. What is irregular beyond the error goes to step II of the Two-Step Test: chaotic, quasiperiodic or undetermined.
@@ -16,10 +17,12 @@ from numpy.typing import ArrayLike
 
 from chaosgym.arrays import Array
 from chaosgym.errors import DiagnosisError
+from chaosgym.recordings.description import Sampled, describe, is_sampling_beat
+from chaosgym.recordings.fixed_motion import Line, line_of
 from chaosgym.recordings.measured_verdict import MeasuredVerdict
 from chaosgym.recordings.scatter import judge_scatter, newton, scatter_of
 from chaosgym.recordings.sensors import judge_together
-from chaosgym.series.noise import SensorError, find_change, quantum, repair, stated_error
+from chaosgym.series.noise import FEW_OUTLIERS, SensorError, equal_interval, find_change, quantum, repair, stated_error
 from chaosgym.series.two_step import INITIAL_TRANSIENT, two_step_test
 from chaosgym.series.verdict import Diagnosis, undetermined
 
@@ -35,6 +38,9 @@ LARGEST_FORCE, SMALLEST_FORCE = 1e9, 1e-100
 MOST_PARTS = 3
 """How often a record is cut in two."""
 
+LITTLE = 0.3
+"""Share of its standard deviation that a motion leaves which holds over a change."""
+
 
 def judge_peaks(
     peaks: ArrayLike,
@@ -43,6 +49,7 @@ def judge_peaks(
     sensor_sigma: float | None = None,
     resolution: float = 0.0,
     unit: str = "N",
+    sampled: Sampled | None = None,
 ) -> MeasuredVerdict:
     """Tell the nature of a measured response from one reading a cycle of one sensor, or of several.
 
@@ -58,6 +65,8 @@ def judge_peaks(
         Half width of what the evaluation itself adds, such as the sampling of a series.
     unit
         Unit of the readings, in which the verdict tells sizes.
+    sampled
+        How a series was sampled from which the peaks are, if they are: tells sampling beats and hum from other lines.
 
     Raises
     ------
@@ -76,12 +85,21 @@ def judge_peaks(
         if not table.shape[1]:
             raise DiagnosisError(f"the record has shape {table.shape}; allowed: (cycles,) or (cycles, sensors)")
         alone = [
-            judge_peaks(column, sensor_error=sensor_error, sensor_sigma=sensor_sigma, resolution=resolution, unit=unit)
+            judge_peaks(
+                column,
+                sensor_error=sensor_error,
+                sensor_sigma=sensor_sigma,
+                resolution=resolution,
+                unit=unit,
+                sampled=sampled,
+            )
             for column in table.T
         ]
         return judge_together(alone, table, [f"sensor {place}" for place in range(1, len(alone) + 1)])
     if unit != "N":
-        verdict = judge_peaks(peaks, sensor_error=sensor_error, sensor_sigma=sensor_sigma, resolution=resolution)
+        verdict = judge_peaks(
+            peaks, sensor_error=sensor_error, sensor_sigma=sensor_sigma, resolution=resolution, sampled=sampled
+        )
         return _in_unit(verdict, unit)
     readings = _checked(peaks)
     told = stated_error(sensor_error, sensor_sigma)
@@ -90,25 +108,54 @@ def judge_peaks(
     if len(readings) < SHORT_RECORD:
         few = f"{len(readings)} cycles are too few to judge; needed: {SHORT_RECORD} or more"
         return MeasuredVerdict(undetermined(few, readings, MORE), told)
-    whole, outliers, gaps = repair(readings)
+    on_line = line_of(readings)
+    fixed = on_line is not None and on_line.rest < LITTLE * float(np.std(readings))
+    whole, outliers, gaps = (readings, (), ()) if fixed else repair(readings)
     why = unsteady(whole)
     if why:
         return MeasuredVerdict(undetermined(f"not a steady response: {why}", readings), told, outliers=outliers)
     resolved = max(resolution, 0.5 * quantum(readings))
-    parts = _parts(whole, resolved / math.sqrt(3.0) + 1e-5 * float(np.max(np.abs(whole))), MOST_PARTS)
-    verdicts = [_judge_part(part, told, resolved) for part in parts]
-    verdict = _joined(verdicts, [len(part) for part in parts])
-    if len(parts) > 1 and verdict.diagnosis.nature == "undetermined":
-        verdict = _judge_part(whole, told, resolved)
+    cuts = 0 if fixed else MOST_PARTS
+    parts = _parts(whole, resolved / math.sqrt(3.0) + 1e-5 * float(np.max(np.abs(whole))), cuts)
+    verdict = _judge_part(whole, told, resolved)
+    if len(parts) > 1 and not _accounts_for(verdict, whole):
+        verdict = _joined([_judge_part(part, told, resolved) for part in parts], [len(part) for part in parts])
+    elif len(parts) > 1:
+        parts = [whole]
     changes = tuple(int(place) + 1 for place in np.cumsum([len(part) for part in parts])[:-1])
     notes = [*verdict.notes]
     if outliers:
-        notes.insert(0, f"left out as wrong readings: cycle{'s' * (len(outliers) > 1)} {_listed(outliers)}")
+        every = equal_interval(outliers)
+        spikes = f"cycle{'s' * (len(outliers) > 1)} {_listed(outliers)}"
+        if every is None:
+            notes.insert(0, f"left out as wrong readings: {spikes}")
+        else:
+            verdict = _apart_from(verdict, f"apart from a spike every {every:.4g} cycles")
+            notes.insert(0, f"a spike every {every:.4g} cycles, which no wrong readings make: {spikes}")
+        if every is None and len(outliers) > FEW_OUTLIERS * len(readings):
+            verdict = _apart_from(verdict, f"if its {len(outliers)} spikes are wrong readings")
     if gaps:
         notes.insert(0, f"cycles are missing before cycle {_listed(gaps)}")
     if len(changes) == 1:
         notes.insert(0, f"the response changes at cycle {changes[0]}")
-    return replace(verdict, outliers=outliers, gaps=gaps, changes=changes, notes=tuple(notes))
+    found = scatter_of(whole, resolved / math.sqrt(3.0)) if np.ptp(whole) > 0.0 else None
+    line = on_line if fixed or found is None or found.random else line_of(found.level)
+    if line is not None and is_sampling_beat(line, len(whole), sampled):
+        verdict = _of_sampling(verdict, line)
+    heights = readings[np.array(outliers, int) - 1] - np.median(readings)
+    seen = () if found is None else describe(found, line, outliers, heights, changes, sampled)
+    return replace(verdict, outliers=outliers, gaps=gaps, changes=changes, description=seen, notes=tuple(notes))
+
+
+def _of_sampling(verdict: MeasuredVerdict, line: Line) -> MeasuredVerdict:
+    """The verdict without a line that the sampling of the series makes."""
+    found = verdict.diagnosis
+    if found.nature == "undetermined" or "line_cycles" not in found.evidence:
+        return verdict
+    condition = found.condition.partition("and if ")[2]
+    reason = f"repeats but for a sampling beat of {line.cycles:.4g} cycles; {found.reason}"
+    periodic = replace(found, nature="periodic", period=line.period, reason=reason)
+    return replace(verdict, diagnosis=replace(periodic, condition=f"if {condition}" if condition else ""))
 
 
 def _in_unit(verdict: MeasuredVerdict, unit: str) -> MeasuredVerdict:
@@ -118,7 +165,8 @@ def _in_unit(verdict: MeasuredVerdict, unit: str) -> MeasuredVerdict:
         return re.sub(r"(?<=\d) N\b", f" {unit}", text.replace("the force", "the reading"))
 
     diagnosis = replace(verdict.diagnosis, reason=shown(verdict.diagnosis.reason))
-    return replace(verdict, diagnosis=diagnosis, notes=tuple(map(shown, verdict.notes)), unit=unit)
+    seen = tuple(feature._replace(text=shown(feature.text)) for feature in verdict.description)
+    return replace(verdict, diagnosis=diagnosis, description=seen, notes=tuple(map(shown, verdict.notes)), unit=unit)
 
 
 def _checked(peaks: ArrayLike) -> Array:
@@ -152,6 +200,21 @@ def _parts(readings: Array, floor: float, cuts: int) -> list[Array]:
     return [*_parts(readings[:place], floor, cuts - 1), *_parts(readings[place:], floor, cuts - 1)]
 
 
+def _apart_from(verdict: MeasuredVerdict, condition: str) -> MeasuredVerdict:
+    """The verdict under one more condition, if it is one."""
+    if verdict.diagnosis.nature == "undetermined":
+        return verdict
+    conditions = " and ".join(filter(None, (condition, verdict.diagnosis.condition)))
+    return replace(verdict, diagnosis=replace(verdict.diagnosis, condition=conditions))
+
+
+def _accounts_for(verdict: MeasuredVerdict, readings: Array) -> bool:
+    """Whether one pattern, line or torus holds over a change that was found, so that the change belongs to it."""
+    if verdict.diagnosis.nature not in ("periodic", "quasiperiodic"):
+        return False
+    return verdict.scatter is None or verdict.scatter < LITTLE * float(np.std(readings))
+
+
 def _joined(verdicts: list[MeasuredVerdict], cycles: list[int]) -> MeasuredVerdict:
     """Verdict on the whole: the last regime, unless an earlier one was irregular for more than a transient."""
     last = verdicts[-1]
@@ -160,6 +223,12 @@ def _joined(verdicts: list[MeasuredVerdict], cycles: list[int]) -> MeasuredVerdi
     natures = [verdict.diagnosis.nature for verdict in verdicts]
     irregular = [verdict for verdict in verdicts if verdict.diagnosis.nature in ("chaotic", "quasiperiodic")]
     horizon = sum(cycles)
+    seen, open_ = (
+        sum(n for v, n in zip(verdicts, cycles, strict=True) if (v.diagnosis.nature == "undetermined") is unknown)
+        for unknown in (False, True)
+    )
+    if seen <= open_:
+        irregular = []
     if len(verdicts) > 2 and irregular:
         reason = f"intermittent: {len(verdicts) - 1} changes between {' and '.join(dict.fromkeys(natures))} stretches"
         return replace(irregular[0], diagnosis=replace(irregular[0].diagnosis, reason=reason, horizon=horizon))

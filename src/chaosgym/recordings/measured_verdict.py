@@ -1,10 +1,22 @@
 """The verdict on a measured record: a diagnosis, and what is known of its readings."""
 
 from dataclasses import dataclass
-from typing import Any
+from typing import Any, NamedTuple
 
 from chaosgym.series.noise import SensorError
 from chaosgym.series.verdict import Diagnosis
+
+
+class Feature(NamedTuple):
+    """One thing that is seen: its kind, a phrase for people, and its figures."""
+
+    kind: str
+    text: str
+    figures: dict[str, float]
+
+    def as_dict(self) -> dict[str, Any]:
+        """Return plain values for JSON."""
+        return {"kind": self.kind, "text": self.text, **self.figures}
 
 
 @dataclass(frozen=True)
@@ -30,6 +42,8 @@ class MeasuredVerdict:
         Cycles, from 1, before which some are missing.
     changes
         First cycles, from 1, of a later regime.
+    description
+        What is seen beside the nature: patterns, lines, trends, changes, spikes, levels, bursts.
     notes
         Sentences for people on what was left out, and on drift.
     unit
@@ -44,13 +58,20 @@ class MeasuredVerdict:
     outliers: tuple[int, ...] = ()
     gaps: tuple[int, ...] = ()
     changes: tuple[int, ...] = ()
+    description: tuple[Feature, ...] = ()
     notes: tuple[str, ...] = ()
     unit: str = "N"
+
+    @property
+    def remarks(self) -> tuple[str, ...]:
+        """Sentences for people: what is seen, and the notes."""
+        return (*(f"seen: {feature.text}" for feature in self.description), *self.notes)
 
     def as_dict(self) -> dict[str, Any]:
         """Return plain values for JSON: those of the diagnosis, and what is known of the readings."""
         error = None if self.error is None else self.error._asdict()
         own: dict[str, Any] = {n: list(getattr(self, n)) for n in ("outliers", "gaps", "changes", "notes")}
         own |= {name: getattr(self, name) for name in ("scatter", "coefficient_of_variation", "random", "unit")}
+        own["description"] = [feature.as_dict() for feature in self.description]
         own["condition"] = self.diagnosis.condition
         return {**self.diagnosis.as_dict(), "sensor_error": error, **own}

@@ -27,7 +27,7 @@ from chaosgym.series.stroboscopic import irregularity
 Event = Literal["", "change", "alarm", "all clear", "dead sensor", "missing"]
 
 LAGS, LONGEST = 8, 16
-"""Longest period that counts as repeating, and that of ``chaosgym classify --follow``."""
+"""Longest period that counts as repeating, and that of ``chaosgym monitor``."""
 
 DRIFT, CAP, LIMIT = 0.45, 1.5, 2.5
 """Of the cumulative sums, in twice the sensor's error."""

@@ -22,7 +22,7 @@ STEP = re.compile(
     r"wf_increment|increment|time[ _]?step|dx|dt",
     re.IGNORECASE,
 )
-UNIT = re.compile(r"unit_?string|units?|einheit(en)?|quantity", re.IGNORECASE)
+UNIT = re.compile(r"unit_?string|(ni_?)?unit_?description|units?|einheit(en)?|quantity", re.IGNORECASE)
 SPEED = re.compile(r".*rpm", re.IGNORECASE)
 """Names under which files keep the sampling rate, the interval, the unit of a column, and the speed of the shaft."""
 

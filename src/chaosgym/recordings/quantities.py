@@ -67,7 +67,7 @@ _SUFFIXES = "N kN mN daN lbf kgf gf s ms us ns rpm Hz kHz mV mm um"
 SUFFIXES = frozenset(_SUFFIXES.split())
 """Units that may end a name after an underscore or "in": single letters such as A and V number channels as well."""
 
-CLOCK = re.compile(r"t|time\w*|\w*time|zeit\w*|\w*zeit|temps|\w*stamp|date\w*|datum|clock|elapsed", re.IGNORECASE)
+CLOCK = re.compile(r"(?-i:t)|time\w*|\w*time|zeit\w*|\w*zeit|temps|\w*stamp|date\w*|datum|clock|elapsed", re.IGNORECASE)
 """Words in the name of a column of instants."""
 
 

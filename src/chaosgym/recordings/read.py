@@ -195,10 +195,11 @@ def _bytes_of(path: Path) -> Data:
             f"{path} holds {told.st_size / 2**30:.1f} GiB; allowed: up to 1 GiB; cut it, or one peak a cycle"
         )
     if not stat.S_ISFIFO(told.st_mode):
-        if not told.st_size:
-            return path.read_bytes()
         with open(path, "rb") as file:
-            return mmap.mmap(file.fileno(), 0, access=mmap.ACCESS_READ)
+            try:
+                return mmap.mmap(file.fileno(), 0, access=mmap.ACCESS_READ)
+            except (OSError, ValueError):  # an empty file, or a file system that maps none
+                return file.read()
     with open(os.open(path, os.O_RDONLY | os.O_NONBLOCK), "rb") as pipe:
         if not select.select([pipe], [], [], PATIENCE)[0]:
             raise DiagnosisError(f"{path} is a pipe into which nothing was written for {PATIENCE:g} s")

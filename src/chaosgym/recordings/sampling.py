@@ -174,17 +174,22 @@ def _size(recording: Recording, name: str, rate_hz: float | None) -> tuple[float
     Raises
     ------
     DiagnosisError
-        If they step so far that they may count parts of a second.
+        If they contradict the stated rate, or step so far that they may count parts of a second.
     """
     values = recording.columns[name].astype(float)
     step, typical = float(values[-1] - values[0]) / max(1, len(values) - 1), float(np.median(np.diff(values)))
-    if rate_hz is not None and step > 0.0:
+    if rate_hz is not None:
         for unit in ("s", "ms", "us", "ns"):
-            if abs(step * TIMES[unit] * rate_hz - 1.0) < AGREE:
+            if min(abs(each * TIMES[unit] * rate_hz - 1.0) for each in (step, typical)) < AGREE:
                 return TIMES[unit], f"{unit}, by the stated rate of {rate_hz:.6g} Hz"
     for least, size in EPOCHS.items():
         if least <= values[0] and values[-1] < 3.0 * least and typical * size < 2.0:
             return size, f"{duration(size).removeprefix('1 ')} since 1970"
+    if rate_hz is not None:
+        raise DiagnosisError(
+            f"{recording.source}: column {name!r} rises in steps of {typical:.6g} without a unit, and the file states "
+            f"{rate_hz:.6g} Hz; use --rate-hz"
+        )
     if typical >= SLOW * (1.0 - 1e-9):
         raise DiagnosisError(
             f"{recording.source}: column {name!r} rises in steps of {typical:.6g} without a unit; name it "

@@ -15,6 +15,17 @@ from itertools import repeat
 import numpy as np
 
 from chaosgym.arrays import Array
+from chaosgym.recordings.fixed_motion import (
+    MOST_READINGS,
+    REPEATED,
+    THRICE,
+    Line,
+    is_random,
+    line_of,
+    long_pattern,
+    pattern_variances,
+    without_trend,
+)
 from chaosgym.recordings.measured_verdict import MeasuredVerdict
 from chaosgym.series.determinism import DRIVEN, LEAST_GAIN, Determinism, beats_surrogates, determinism, drive
 from chaosgym.series.noise import (
@@ -39,6 +50,12 @@ chaotic cranks scatter by more. A stated error above the second hides what would
 PATTERN, LONGEST_PATTERN, SEEN = 2.0, 32, 12
 """Standard deviation of a pattern in those of the scatter around it, its longest period, and how often it is seen."""
 
+WITHIN = 1.02
+"""Factor by which a reading may exceed the stated largest error; more where a trend was taken out, which is less sure."""
+
+LONG_PATTERN = 3.0
+"""Standard deviation of readings in those of what a pattern leaves that is seen three to eleven times."""
+
 NOISE_SHARE = 0.5
 """Share of the scatter that a forecast must leave where noise alone keeps a resting map apart."""
 
@@ -46,8 +63,12 @@ ONE_LINE, LONE_LINE_PERIOD = 0.9, 5
 """Share of the variance in one line of the spectrum from which it may be a hum of the mains, and by what factor a
 pattern must be longer than another for it."""
 
+LINE_GAIN = 1.1
+"""Factor by which the variance around a pattern must exceed what a line leaves, which has fewer parameters."""
+
 FEW_LINES, LINES_REST = 2, 1.2
-"""Sinusoids that may explain the readings as well as a map, and the factor by which they must leave more than it."""
+"""Sinusoids that may explain the readings as well as a map, and the factor by which they, and every pattern that is
+seen thrice, must leave more than it."""
 
 TORUS_REST, HUMMED_PATTERN = 0.3, 16
 """Share of its standard deviation that the lines of a torus may leave, and the longest pattern under a hum: longer ones
@@ -56,17 +77,25 @@ come near to any torus."""
 ENOUGH_CYCLES = 100
 """Cycles from which small random scatter is told from chaos without a stated error."""
 
-MORE_CYCLES = 1000
-"""Cycles below which more of them would tell more."""
+FEW_CYCLES, MORE_CYCLES = 200, 1000
+"""Cycles below which more of them would tell more of scatter that looks random, and of a map that is not sure."""
+
+SENSOR_LIKE = 0.03
+"""Scatter, as a share of the mean reading, that may be all a sensor's."""
 
 
 @dataclass(frozen=True)
 class Scatter:
-    """What the readings of a stretch do about their repetition."""
+    """What the readings of a stretch do about their repetition.
+
+    ``readings`` are less their drift and the trend of their pattern, ``level`` less their drift only.
+    """
 
     readings: Array
+    level: Array
     period: int
     drift: float
+    growth: float
     sigma: float
     mean: float
     forecast: float
@@ -90,7 +119,8 @@ class Scatter:
     def has_pattern(self) -> bool:
         """Whether a period above one stands out of the scatter, and is the same in both halves."""
         size, k = len(self.readings), self.period
-        if not 1 < k <= LONGEST_PATTERN or size < SEEN * k:
+        often = k <= LONGEST_PATTERN and size >= SEEN * k
+        if k == 1 or not (often or self._has_long_pattern):
             return False
         half = size // (2 * k) * k
         halves = [part.reshape(-1, k).mean(axis=0) for part in (self.readings[:half], self.readings[half : 2 * half])]
@@ -100,6 +130,16 @@ class Scatter:
         stands_out = min(float(np.std(pattern)) for pattern in patterns) >= PATTERN * self.sigma
         apart = max(0.5, 4.0 * math.sqrt(2.0 * k / half)) * self.sigma
         return stands_out and float(np.max(np.abs(patterns[0] - patterns[1]))) < apart
+
+    @property
+    def _has_long_pattern(self) -> bool:
+        """Whether a pattern that is seen a few times forecasts many cycles, to a third of its standard deviation."""
+        size, k = len(self.readings), self.period
+        return (
+            self.random
+            and size >= max(THRICE * k, k + REPEATED)
+            and float(np.std(self.readings)) > LONG_PATTERN * self.sigma
+        )
 
     def evidence(self) -> dict[str, float]:
         """Figures for JSON."""
@@ -122,13 +162,16 @@ def scatter_of(readings: Array, floor: float) -> Scatter:
     size = len(readings)
     level, drift = without_drift(readings, dominant_period(readings, floor))
     longest = max(1, size // REPEATS)
-    variances = np.array([np.sum(class_residual(level, k) ** 2) / (size - k) for k in range(1, min(64, longest) + 1)])
+    variances = pattern_variances(level, min(64, longest))
     allowed = variances.min() * (1.0 + 3.0 * math.sqrt(2.0 / size)) + floor**2
     period = int(np.flatnonzero(variances <= allowed)[0]) + 1
-    residual = class_residual(level, period)
-    sigma = math.sqrt(float(variances[period - 1]))
-    forecast = max(predictability(level, residual), correlation(residual, period))
-    return Scatter(level, period, drift, sigma, float(np.mean(np.abs(readings))), forecast)
+    period = long_pattern(level, float(variances[period - 1]), floor) or period
+    steady, growth = without_trend(level, period)
+    residual = class_residual(steady, period)
+    sigma = math.sqrt(float(np.sum(residual**2)) / (size - period))
+    again = period if size >= SEEN * period else 1  # readings of a phase seen a few times are less their own mean
+    forecast = max(predictability(steady, residual), correlation(residual, again))
+    return Scatter(steady, level, period, drift, growth, sigma, float(np.mean(np.abs(readings))), forecast)
 
 
 def left_by_hum(readings: Array) -> float:
@@ -151,10 +194,13 @@ def _judge(found: Scatter, told: SensorError | None, resolved: float) -> Measure
         step = told or SensorError(resolved, resolved / math.sqrt(3.0), "estimated")
         return _periodic(found, f"within {newton(2.0 * resolved)}, the step of the record", step)
     most = None if told is None else _most(found, told, resolved)
+    line = None if found.random and found.period == 1 else line_of(found.level)
+    if line is not None and _better(line, found):
+        return _torus_of(found, told, most, resolved) or _on_line(found, line, told, most)
     if most is not None and found.sigma <= most:
         assert told is not None
         return _within_error(found, told, resolved)
-    torus = _torus(found, max(SMALL_SCATTER * found.mean, resolved) if most is None else most, told)
+    torus = _torus_of(found, told, most, resolved)
     if torus is not None:
         return torus
     if len(found.readings) < CHAOTIC_CYCLES:
@@ -167,7 +213,45 @@ def _judge(found: Scatter, told: SensorError | None, resolved: float) -> Measure
     fitted = determinism(found.readings)
     if is_chaotic([found], fitted):
         return chaotic([found], fitted, told)
-    return _random(found, fitted, told) or _cannot_tell(found, told)
+    return _random(found, fitted, told) or _resting(found, fitted, told) or _cannot_tell(found, fitted, told)
+
+
+def _better(line: Line, found: Scatter) -> bool:
+    """Whether a line leaves less than the pattern, which may be its own that nearly repeats."""
+    own = may_be_hum(found.readings[: found.period] - found.residual[: found.period])
+    return own or LINE_GAIN * line.rest**2 < found.sigma**2
+
+
+def _on_line(found: Scatter, line: Line, told: SensorError | None, most: float | None) -> MeasuredVerdict:
+    """Verdict on one line: hum, modulation of the load or beat, or the machine's own, which a record does not tell.
+
+    A small sinusoid is taken for the former, a large one or one with multiples for the latter; the condition says so.
+    """
+    size, held = len(found.level), line.share * float(np.var(found.level))
+    pattern, own = f"periodic, period {line.period}", not line.pure or held > (LARGE_SCATTER * found.mean) ** 2
+    turns = f"its line of period {line.cycles:.4g} cycles"
+    condition = (
+        f"if {turns} is the machine's own, else {pattern}" if own else f"if {turns} is from outside, else quasiperiodic"
+    )
+    if most is None or line.rest > most:
+        condition += f", and if its scatter of {100.0 * line.rest / found.mean:.2g} % is random"
+    beneath = "one level" if line.period == 1 else f"a pattern of {line.period} cycles"
+    diagnosis = Diagnosis(
+        nature="quasiperiodic" if own else "periodic",
+        period=None if own else line.period,
+        margin=float(np.clip(1.0 - line.rest**2 / max(found.sigma**2, 1e-300), 0.0, 1.0)),
+        reason=f"one line of the spectrum on {beneath} leaves {newton(line.rest)} (standard deviation)",
+        horizon=size,
+        evidence={"cycles": size, **found.evidence(), "line_cycles": line.cycles, "line_share": line.share},
+        condition=condition,
+    )
+    error = told or SensorError(3.0 * line.rest, line.rest, "estimated")
+    share = line.rest / found.mean if found.mean else 0.0
+    return MeasuredVerdict(diagnosis, error, scatter=line.rest, coefficient_of_variation=share, random=True)
+
+
+def _torus_of(found: Scatter, told: SensorError | None, most: float | None, resolved: float) -> MeasuredVerdict | None:
+    return _torus(found, max(SMALL_SCATTER * found.mean, resolved) if most is None else most, told)
 
 
 def _most(found: Scatter, told: SensorError, resolved: float) -> float:
@@ -190,17 +274,36 @@ def _within_error(found: Scatter, told: SensorError, resolved: float) -> Measure
     if may_be_hum(found.readings[: found.period] - found.residual[: found.period]):
         reason = f"can't tell: repeats every {found.period} cycles, or a line of the spectrum (a hum) lies on less"
         return _open(found, reason, told)
-    outside = float(np.mean(np.abs(found.residual) > half_width))
+    furthest = np.abs(around_middle(found.readings, found.period))
+    slack = 2.0 * math.sqrt(found.period / len(found.readings)) if found.growth or found.drift else 0.0
+    outside = (
+        float(np.mean(np.abs(found.residual) > half_width)) if furthest.max() > (WITHIN + slack) * half_width else 0.0
+    )
+    condition = ""
     if told.source == "stated sigma":
         shown = f"with a standard deviation of {newton(found.sigma)}; stated: {newton(told.sigma)}"
     elif outside:
         shown = (
             f"with a standard deviation of {newton(found.sigma)}; {100.0 * outside:.2g} % of the readings lie outside "
-            f"the stated +-{newton(half_width)}"
+            f"the stated +-{newton(half_width)}, the farthest by {newton(float(furthest.max()))}"
         )
+        condition = f"if the sensor errs by more than the stated {newton(half_width)}"
     else:
         shown = f"within {newton(float(np.max(np.abs(found.residual))))}; stated: {newton(half_width)}"
-    return _periodic(found, shown, told)
+    verdict = _periodic(found, shown, told)
+    return replace(verdict, diagnosis=replace(verdict.diagnosis, condition=condition))
+
+
+def around_middle(values: Array, period: int) -> Array:
+    """Readings less the middle between the least and the largest of the same phase, (cycles,).
+
+    All lie within the largest error of a sensor if any level of the phase has them within it.
+    """
+    phase = np.arange(len(values)) % period
+    middle = [
+        0.5 * (float(np.min(values[first::period])) + float(np.max(values[first::period]))) for first in range(period)
+    ]
+    return np.asarray(values - np.array(middle)[phase])
 
 
 def _periodic(found: Scatter, how: str, error: SensorError | None, *, random: bool = False) -> MeasuredVerdict:
@@ -241,6 +344,29 @@ def _random(found: Scatter, fitted: Determinism, told: SensorError | None) -> Me
     return _if_random(_periodic(found, f"{how}, more than the stated error", told, random=True), found)
 
 
+def _resting(found: Scatter, fitted: Determinism, told: SensorError | None) -> MeasuredVerdict | None:
+    """Periodic if noise in the process is all that keeps readings from it: the fitted map comes to rest on a period."""
+    period = fitted.resting_period
+    if period is None or not beats_surrogates(found.readings, fitted):
+        return None
+    left = math.sqrt(float(fitted.nonlinear[0])) * float(np.std(found.readings))
+    verdict = MeasuredVerdict(
+        Diagnosis(
+            nature="periodic",
+            period=period,
+            margin=float(np.clip(1.0 - np.exp(np.quantile(fitted.exponents, 0.9)), 0.0, 1.0)),
+            reason=f"a map of the last {fitted.dimension} readings comes to rest on period {period} without noise; "
+            f"its forecasts leave {newton(left)} (standard deviation)",
+            horizon=len(found.readings),
+            evidence={"cycles": len(found.readings), **found.evidence(), "map_period": period},
+            condition=f"if the {100.0 * left / found.mean:.2g} % that a map leaves is random",
+        ),
+        told,
+        random=True,
+    )
+    return verdict
+
+
 def _if_random(verdict: MeasuredVerdict, found: Scatter) -> MeasuredVerdict:
     """A periodic verdict under the condition that its scatter is no chaos, which a single record can't prove."""
     condition = f"if its scatter of {100.0 * found.relative:.2g} % is random"
@@ -253,11 +379,21 @@ def _beyond(found: Scatter, told: SensorError | None) -> str:
     return f"irregular beyond {newton(told.half_width)}, the sensor's error"
 
 
-def _cannot_tell(found: Scatter, told: SensorError | None) -> MeasuredVerdict:
-    ask = ["the sensor's error"] if told is None else []
-    ask += ["more cycles"] if len(found.readings) < MORE_CYCLES else []
-    ask += ["a second sensor", "another speed", "the machine's model"]
-    return _open(found, f"{_beyond(found, told)}: random or chaotic, this record cannot tell", told, ask)
+def _cannot_tell(found: Scatter, fitted: Determinism, told: SensorError | None) -> MeasuredVerdict:
+    """Undetermined: why, and what would help with this record."""
+    small, short = told is None and found.relative < SENSOR_LIKE, len(found.readings)
+    ask = ["the sensor's error"] if small else []
+    curved = bool(fitted.nonlinear[0] < LEAST_GAIN * fitted.linear[0])
+    if curved:
+        why = "a map forecasts it in part, and neither chaos nor rest of the map is sure"
+        ask += ["more cycles"] if short < MORE_CYCLES else []
+    elif found.random:
+        why = "no reading can be forecast from those before, by which noise and fast chaos look alike"
+        ask += ["more cycles"] if short < FEW_CYCLES else []
+    else:
+        why = "its readings are correlated, as those of noise are, and no map forecasts them better than a line"
+        ask += ["a record of load, supply or speed beside it"]
+    return _open(found, f"{_beyond(found, told)}: {why}", told, [*ask, "a second sensor", "the machine's model"])
 
 
 def _open(found: Scatter, reason: str, error: SensorError | None, tells_more: Sequence[str] = ()) -> MeasuredVerdict:
@@ -274,8 +410,9 @@ def is_chaotic(several: Sequence[Scatter], fitted: Determinism) -> bool:
         return False
     for found, nonlinear in zip(ordered, fitted.nonlinear, strict=True):
         least = min(float(np.std(without_lines(found.readings, FEW_LINES, 0.0)[0])), left_by_hum(found.readings))
-        lines_explain = least**2 < LINES_REST * nonlinear * float(np.var(found.readings))
-        if lines_explain or drive(found.readings)[0] <= DRIVEN:
+        pattern = pattern_variances(found.readings[-MOST_READINGS:], min(len(found.readings), MOST_READINGS) // THRICE)
+        fixed_explains = min(least**2, float(pattern.min())) < LINES_REST * nonlinear * float(np.var(found.readings))
+        if fixed_explains or drive(found.readings)[0] <= DRIVEN:
             return False
     return beats_surrogates(np.column_stack([found.readings for found in several]), fitted)
 
@@ -328,7 +465,9 @@ def _torus(found: Scatter, most: float, told: SensorError | None) -> MeasuredVer
     One line alone, or on a pattern, is as well a hum of the mains or a modulation of the load.
     """
     size = len(found.readings)
-    if size < QUASIPERIODIC_CYCLES or found.forecast < 2.0 * RANDOM or found.relative < SMALL_SCATTER:
+    if size < QUASIPERIODIC_CYCLES:
+        return _two_lines(found, most, told)
+    if found.forecast < 2.0 * RANDOM or found.relative < SMALL_SCATTER:
         return None
     rest, lines = without_lines(found.readings, MAX_LINES, 0.5 * most if told is None else most)
     sigma = float(np.std(rest))
@@ -342,6 +481,26 @@ def _torus(found: Scatter, most: float, told: SensorError | None) -> MeasuredVer
         nature="quasiperiodic", margin=1.0 - sigma / most, reason=reason, horizon=size, evidence=evidence
     )
     return MeasuredVerdict(diagnosis, told or SensorError(3.0 * sigma, sigma, "estimated"))
+
+
+def _two_lines(found: Scatter, most: float, told: SensorError | None) -> MeasuredVerdict | None:
+    """Quasiperiodic under a condition: in a short record two lines leave nothing but small random scatter."""
+    size = len(found.readings)
+    if size < ENOUGH_CYCLES or found.forecast < 2.0 * RANDOM:
+        return None
+    rest, _ = without_lines(found.level, FEW_LINES, 0.0)
+    sigma = float(np.std(rest))
+    if sigma > min(most, TORUS_REST * float(np.std(found.level))) or not is_random(rest):
+        return None
+    diagnosis = Diagnosis(
+        nature="quasiperiodic",
+        margin=1.0 - sigma / most,
+        reason=f"two lines of the spectrum leave {newton(sigma)} (standard deviation), at random",
+        horizon=size,
+        evidence={"cycles": size, **found.evidence(), "spectral_lines": FEW_LINES},
+        condition=f"if its two lines in {size} cycles are the machine's own",
+    )
+    return MeasuredVerdict(diagnosis, told or SensorError(3.0 * sigma, sigma, "estimated"), scatter=sigma, random=True)
 
 
 def newton(force: float) -> str:

@@ -61,6 +61,9 @@ SAME_SPREAD = (0.5, 1.5)
 REST = -0.02
 """Exponent per cycle below which nine in ten refits must lie where the map comes to rest."""
 
+REST_SURELY = -0.1
+"""The same where the period on which the map rests is told: nearer to zero it may be twice as long."""
+
 SURROGATES = 39
 """Random records of the same spectrum and distribution; the record must beat all: one chance in forty."""
 
@@ -80,6 +83,8 @@ class Determinism(NamedTuple):
         Largest exponent per cycle of each refit, iterated without noise; -inf where it leaves the readings' range.
     spread : (sensors,)
         Standard deviation of the iterated maps that stay bounded, all together, as a share of that of the readings.
+    period
+        Period on which all refits come to rest; None if they do not.
     """
 
     order: tuple[int, ...]
@@ -87,6 +92,7 @@ class Determinism(NamedTuple):
     linear: Array
     exponents: Array
     spread: Array
+    period: int | None
 
     @property
     def nonlinear(self) -> Array:
@@ -107,10 +113,19 @@ class Determinism(NamedTuple):
     @property
     def map_is_chaotic(self) -> bool:
         """Whether the map without noise is irregular for certain, and accounts for the readings."""
+        return self._accounts and self.exponent[0] > LEAST_EXPONENT
+
+    @property
+    def resting_period(self) -> int | None:
+        """Period of the map without noise, two at least, where it accounts for the readings; else None."""
+        rests = np.quantile(self.exponents, 0.9) < REST_SURELY
+        return self.period if self._accounts and rests and (self.period or 1) > 1 else None
+
+    @property
+    def _accounts(self) -> bool:
         low, high = SAME_SPREAD
         accounts = (self.nonlinear < MOST_LEFT) & (self.nonlinear < LEAST_GAIN * self.linear)
-        same = (low < self.spread) & (self.spread < high)
-        return bool(accounts.all() and self.exponent[0] > LEAST_EXPONENT and same.all())
+        return bool(accounts.all() and ((low < self.spread) & (self.spread < high)).all())
 
     @property
     def map_rests(self) -> bool:
@@ -128,9 +143,9 @@ def determinism(values: Array) -> Determinism:
     resampled[0] = 1.0
     weights = [weights_of(model, *each, resampled) for model, each in zip(maps, found, strict=True)]
     longest = max(model.dimension for model in maps)
-    exponents, spread = iterated(maps, weights, [past[:, :longest] for past, _ in found], rng)
+    exponents, spread, period = iterated(maps, weights, [past[:, :longest] for past, _ in found], rng)
     linear = np.array([linear_error(*each) for each in found])
-    return Determinism(order, maps, linear, exponents, spread)
+    return Determinism(order, maps, linear, exponents, spread, period)
 
 
 def _best_order(values: Array) -> tuple[tuple[int, ...], tuple[Map, ...]]:

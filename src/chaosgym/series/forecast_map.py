@@ -37,6 +37,9 @@ LEAST_RIDGE = 1e-9
 TRANSIENT, ITERATIONS = 100, 400
 """Cycles that each map runs before and while its exponent is taken."""
 
+LONGEST_REST, AT_REST = 8, 0.01
+"""Longest period on which a map comes to rest, and within how many standard deviations of the readings it does."""
+
 OUTSIDE, BEYOND = 0.3, 0.1
 """Share of its cycles in which a bounded map may leave the neighbourhood of the readings, and by what share of their
 range that reaches beyond them."""
@@ -141,8 +144,10 @@ def weights_of(model: Map, past: Array, following: Array, resampled: Array) -> A
 
 def iterated(
     maps: tuple[Map, ...], weights: list[Array], before: list[Array], rng: np.random.Generator
-) -> tuple[Array, Array]:
-    """(exponents, standard deviations (sensors,)) of maps that start from readings.
+) -> tuple[Array, Array, int | None]:
+    """(exponents, standard deviations (sensors,), period) of maps that start from readings.
+
+    The period is that on which all refits come to rest, up to ``LONGEST_REST``; None if they do not, or on several.
 
     ``weights`` (refits, coefficients) and readings ``before`` (n, readings) are those of each sensor. A map that leaves
     the neighbourhood of the readings starts anew from one of them; one that does so often is not bounded. The deviation
@@ -173,7 +178,15 @@ def iterated(
                 run[cycle - TRANSIENT, :, place] = following
     bounded = left <= OUTSIDE * (TRANSIENT + ITERATIONS)
     spread = run[:, bounded].std(axis=(0, 1)) if bounded.any() else np.zeros(sensors)
-    return np.where(bounded, growth / ITERATIONS, -np.inf), spread
+    return np.where(bounded, growth / ITERATIONS, -np.inf), spread, _period_of(run)
+
+
+def _period_of(run: Array) -> int | None:
+    """Smallest period after which all maps of a run (iterations, refits, sensors) are where they were; None without."""
+    for period in range(1, LONGEST_REST + 1):
+        if np.max(np.abs(run[-period:] - run[-2 * period : -period])) < AT_REST:
+            return period
+    return None
 
 
 class _Step(NamedTuple):

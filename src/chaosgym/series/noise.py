@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 
 from chaosgym.arrays import Array
 from chaosgym.errors import DiagnosisError
+from chaosgym.series.missing_cycles import with_stand_ins
 
 LONGEST_PERIOD = 64
 """Longest period that is looked for."""
@@ -25,15 +26,15 @@ FAR = 8.0
 REACH = 4
 """Periods before and after a reading over whose median it is judged."""
 
-OUTLIER_SHARE = 0.02
-"""Share of the cycles that may be wrong readings; more of them belong to the motion."""
+OUTLIER_SHARE = 0.05
+"""Share of the cycles that may be spikes or wrong readings; more of them belong to the motion."""
+
+FEW_OUTLIERS = 0.02
+"""Share up to which they may lie among the other readings; more of them must lie beyond these all."""
 
 REPEATING, REPEATING_SPREAD = 0.95, 0.5
 """Share of the readings that come back within the scatter where cycles are missing only, and that scatter's limit as a
 share of the range: in chaos stand-ins for cycles would spoil the record."""
-
-MOST_GAPS = 16
-"""Places at which cycles may be missing."""
 
 NORMAL = 1.4826
 """Standard deviation of a normal variable over its median absolute deviation."""
@@ -125,7 +126,7 @@ def repair(values: Array) -> Repaired:
     """Replace single wrong readings, and fill in missing cycles of a response that otherwise repeats."""
     floor = max(quantum(values), 1e-6 * float(np.max(np.abs(values))))
     period = dominant_period(values, 0.5 * floor)
-    whole, origin = _with_missing_cycles(values, period, floor)
+    whole, origin = with_stand_ins(values, period, max(local_scatter(values, period), floor / 2.4))
     if not _repeats(whole, period, floor):
         whole, origin = values, np.arange(len(values))
     gaps = tuple(int(origin[place + 1]) + 1 for place in np.flatnonzero(origin < 0) if origin[place + 1] >= 0)
@@ -135,9 +136,26 @@ def repair(values: Array) -> Repaired:
     wrong = np.flatnonzero(np.abs(whole - expected) > limit)
     if len(wrong) == 0 or len(wrong) > max(1.0, OUTLIER_SHARE * len(whole)) or _longest_run(wrong) > 2:
         return Repaired(whole, (), gaps)
+    rest = np.delete(whole, wrong)
+    if len(wrong) > FEW_OUTLIERS * len(whole) and np.any((whole[wrong] > rest.min()) & (whole[wrong] < rest.max())):
+        return Repaired(whole, (), gaps)
     mended = whole.copy()
     mended[wrong] = expected[wrong]
     return Repaired(mended, tuple(int(origin[place]) + 1 for place in wrong if origin[place] >= 0), gaps)
+
+
+def equal_interval(cycles: tuple[int, ...]) -> float | None:
+    """Mean interval of cycles that are equally far apart but for rounding, three at least; None if they are not.
+
+    Of three both intervals must be the same, as those of one in a hundred random triples are.
+    """
+    apart = np.diff(cycles)
+    if len(apart) < 2 or apart.min() < 3:
+        return None
+    mean = (cycles[-1] - cycles[0]) / len(apart)
+    line = cycles[0] + mean * np.arange(len(cycles))
+    off = np.abs(np.array(cycles) - line).max()
+    return float(mean) if off <= (0.0 if len(cycles) == 3 else 1.0) else None
 
 
 def _repeats(values: Array, period: int, floor: float) -> bool:
@@ -163,45 +181,6 @@ def _longest_run(places: NDArray[np.intp]) -> int:
     """Most places in succession."""
     breaks = np.flatnonzero(np.diff(places) > 1)
     return int(np.max(np.diff(np.concatenate([[-1], breaks, [len(places) - 1]]))))
-
-
-def _with_missing_cycles(values: Array, period: int, floor: float) -> tuple[Array, NDArray[np.int64]]:
-    """(record with stand-ins for missing cycles, which reading each is, -1 for a stand-in)."""
-    whole, origin = values, np.arange(len(values))
-    for _ in range(MOST_GAPS if period > 1 else 0):
-        limit = max(6.0 * local_scatter(whole, period), 2.5 * floor)
-        start = _first_slip(np.abs(whole[period:] - whole[:-period]) > limit, period)
-        if start is None:
-            break
-        tried = [
-            (place, count)
-            for place in range(start + 1, start + period + 1)
-            for count in range(1, period)
-            if place >= period
-        ]
-        place, missing = min(tried, key=lambda cut: _misfit(whole, cut[0], cut[1], period))
-        if _misfit(whole, place, missing, period) > limit:
-            break
-        stand_in = whole[place - period : place - period + missing]
-        whole = np.concatenate([whole[:place], stand_in, whole[place:]])
-        origin = np.insert(origin, place, np.full(missing, -1))
-    return whole, origin
-
-
-def _first_slip(far: NDArray[np.bool_], period: int) -> int | None:
-    """First place from which several differences over one period are far, and none over two periods after it."""
-    for start in np.flatnonzero(far):
-        during, after = far[start : start + period], far[start + period : start + 3 * period]
-        if len(after) >= period and not after.any() and during.mean() > 0.25 and during.sum() >= 2:
-            return int(start)
-    return None
-
-
-def _misfit(values: Array, place: int, missing: int, period: int) -> float:
-    """Mean difference from the period before if ``missing`` cycles lack before ``place``."""
-    later = values[place : place + period]
-    earlier = values[place - period : place]
-    return float(np.mean(np.abs(later - np.roll(earlier, -missing)[: len(later)])))
 
 
 RANDOM = 3.6

@@ -11,6 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from chaosgym.arrays import Array
+from chaosgym.control.readings import Readings
 from chaosgym.envs.kernels.steps import PLACE
 from chaosgym.envs.memory import irregularity
 from chaosgym.envs.task import Task
@@ -18,8 +19,16 @@ from chaosgym.envs.task import Task
 Observations = NDArray[np.float32]
 
 
+EXCESS = 1.5
+"""Mean peak force over that at the demand above which no controller that goes by measurements stays (assumed): it wears
+the joint four times as fast. A task with a ``damage_weight`` of 0 allows any force."""
+
+
 class Controller:
-    """A rule for many machines side by side; a subclass has ``speeds`` and, for what it remembers, ``begin``."""
+    """A rule for many machines side by side; a subclass has ``speeds`` and, for what it remembers, ``begin``.
+
+    One that goes by measurements alone leaves a speed whose force is ``EXCESS`` times that at the demand.
+    """
 
     knows: str = "nothing"
     """Beside the demand: "measurements", the nominal "model", models within "tolerances", or this very "machine"; and
@@ -36,18 +45,30 @@ class Controller:
     def start(self, envs: Any) -> None:
         """Begin the jobs of a vector environment that has been reset."""
         self.task, self.count = envs.task, envs.num_envs
+        self._readings = Readings(self.task, self.count)
+        self._force = np.full((self.count, len(self.task.grid)), np.nan)
         self.begin(envs)
 
     def begin(self, envs: Any) -> None:
         """Forget the last jobs."""
 
     def __call__(self, observations: Observations) -> NDArray[np.float32]:
-        """Return the actions (n, 1)."""
-        speeds = self.speeds(observations)
+        """Return the actions (n, 1); a step without a usable reading holds, as ``control.readings`` says."""
+        observations = self._readings.take(observations)
+        speeds = self._lighter(observations, self.speeds(observations))
         if self.task.drive == "motor":  # the set-point is ahead by what the motor slipped in the last step
             speeds = speeds + added(observations, self.task, "set_point") - seen(observations, "speed")
         speeds = np.clip(speeds, self.task.lowest_speed, self.task.highest_speed)
-        return speeds[:, None].astype(np.float32)
+        return self._readings.answer(speeds[:, None].astype(np.float32))
+
+    def _lighter(self, observations: Observations, speeds: Array) -> Array:
+        """The speeds, but the demand where the force was ``EXCESS`` times that at the demand, each when last felt."""
+        if self.knows != "measurements" or self.task.damage_weight == 0.0:
+            return speeds
+        every, demand = np.arange(self.count), seen(observations, "demand")
+        self._force[every, place_of(seen(observations, "speed"), self.task)] = seen(observations, "mean_peak_force")
+        at, to = (self._force[every, place_of(values, self.task)] for values in (demand, speeds))
+        return np.where(to > EXCESS * at, demand, speeds)
 
     def speeds(self, observations: Observations) -> Array:
         """Return the speeds (n,) to go to."""

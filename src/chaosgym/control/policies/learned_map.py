@@ -69,11 +69,17 @@ class FeltSpeeds:
         self._last, self._jobs = np.full(count, np.nan), np.arange(count)
         self.settled = np.zeros(count, np.bool_)
 
+    def unusual(self, observations: Observations) -> Array:
+        """How far the readings lie from what is usual at their speed, in standard deviations, (N, 5)."""
+        place = place_of(seen(observations, "speed"), self.task)
+        far = (readings_of(observations, self.task) - self.mean[place]) / self.deviation[place]
+        return np.asarray(far.clip(-LARGEST, LARGEST))
+
     def add(self, observations: Observations) -> NDArray[np.float32]:
         """Take in a step (N, entries); return what is remembered and the share of the job to do, (N, 7 speeds + 1)."""
         speed = seen(observations, "speed")
         place = place_of(speed, self.task)
-        readings = (readings_of(observations, self.task) - self.mean[place]) / self.deviation[place]
+        readings = self.unusual(observations)
         self.settled = np.abs(speed - self._last) < 0.3 * self.task.trim_step
         self._last = speed
         before = self._felt[self._jobs, place]
@@ -82,7 +88,7 @@ class FeltSpeeds:
         weight = np.where(self.settled, np.where(had, AFRESH, 1.0), np.where(had, 0.0, 1.0))[:, None]
         self._felt[self._jobs, place, 0] = 1.0
         self._felt[self._jobs, place, 1] = self.settled | had
-        mixed = (1.0 - weight) * before[:, 2:] + weight * readings.clip(-LARGEST, LARGEST)
+        mixed = (1.0 - weight) * before[:, 2:] + weight * readings
         self._felt[self._jobs, place, 2:] = mixed
         left = seen(observations, "remaining_share")[:, None].astype(np.float32)
         return np.concatenate([self._felt.reshape(len(speed), -1), left], axis=1)
@@ -172,6 +178,10 @@ class LearnedMap(Controller):
             )
         warn_of_other_steps(self.cycles_per_step, envs)
         self._felt = FeltSpeeds(self.task, self.count, self.mean, self.deviation)
+
+    def unusual(self, observations: Observations) -> Array:
+        """How far the readings lie from what was usual in training, in standard deviations, (n, 5)."""
+        return self._felt.unusual(observations)
 
     def speeds(self, observations: Observations) -> Array:
         """The speed of least expected cost."""

@@ -17,6 +17,7 @@ from numpy.typing import NDArray
 
 from chaosgym.control.policies.learned_map import LearnedMap, warn_of_other_steps
 from chaosgym.control.policies.network import Dense, Lstm, Network, State
+from chaosgym.control.readings import Readings
 from chaosgym.envs import environment
 from chaosgym.envs.drive import BACK
 from chaosgym.envs.entries import keywords_of
@@ -100,6 +101,7 @@ class TrainedPolicy:
     knows: str = "measurements"
     _state: State | None = field(default=None, init=False, repr=False)
     _memory: SpeedMemory | None = field(default=None, init=False, repr=False)
+    _readings: Readings | None = field(default=None, init=False, repr=False)
     _width: int = field(init=False, repr=False)
     _columns: list[int] = field(init=False, repr=False)
 
@@ -168,7 +170,7 @@ class TrainedPolicy:
                 f"with the keywords {self.keywords}"
             )
         self._look_at(task.places)
-        self._state, self._memory = None, None
+        self._state, self._memory, self._readings = None, None, Readings(task, count)
         if self.usual:
             if len(self.usual.count) != len(task.grid):
                 raise ModelFileError(
@@ -176,17 +178,33 @@ class TrainedPolicy:
                 )
             self._memory = SpeedMemory(task, count, self.usual, learns=False)
 
+    def unusual(self, observations: Array) -> Array:
+        """How far the readings lie from what was usual in training, in standard deviations, (n, 3).
+
+        Raises
+        ------
+        ModelFileError
+            If the policy has no memory, or has not begun.
+        """
+        if self._memory is None:
+            raise ModelFileError(f"the policy of {self.env} does not know what is usual; allowed: one with a memory")
+        return self._memory.unusual(np.asarray(observations, float))
+
     def __call__(self, observations: Array) -> Array:
         """Return the actions (n,) or (n, 2) for observations (n, entries) of as many jobs as started.
+
+        A step without a usable reading holds, as ``control.readings`` says.
 
         Raises
         ------
         ParameterError
-            If an observation is not finite or has another length.
+            If an observation has another length, or if what is not finite in it is no reading; before a start, if
+            anything is not finite.
         """
         values = np.asarray(observations, np.float32)
-        if values.shape[1:] != (self._width,) or not np.isfinite(values).all():
+        if values.shape[1:] != (self._width,) or not (self._readings or np.isfinite(values).all()):
             raise ParameterError(f"observations have shape {values.shape}; allowed: (n, {self._width}), all finite")
+        values = self._readings.take(values) if self._readings else values
         if self._memory:
             values = self._memory.add(values)
         values = values.take(self._columns, axis=1)
@@ -194,8 +212,10 @@ class TrainedPolicy:
             values = self.normalisation(values)
         answer, self._state = self.network(values, self._state)
         if self.action == "trim":
-            return np.asarray(answer.argmax(axis=-1))
-        return np.asarray(np.tanh(answer) if self.squashed else np.clip(answer, -1.0, 1.0), np.float32)
+            actions = answer.argmax(axis=-1)
+        else:
+            actions = np.asarray(np.tanh(answer) if self.squashed else np.clip(answer, -1.0, 1.0), np.float32)
+        return self._readings.answer(actions) if self._readings else np.asarray(actions)
 
 
 MAP = "map"

@@ -1,0 +1,150 @@
+"""One reading a cycle, or a series over time? By what is stated, by what the file says, and by how its readings lie.
+
+A series that is taken for peaks, or the reverse, gets a verdict on the wrong question. So a file that leaves it open is
+refused, and the message names what to state.
+"""
+
+from typing import Literal, NamedTuple
+
+import numpy as np
+
+from chaosgym.arrays import Array
+from chaosgym.errors import DiagnosisError
+from chaosgym.recordings.read import Recording
+from chaosgym.recordings.sampling import choose_time
+
+Kind = Literal["peaks", "series"]
+
+FAST = 1000.0
+"""Readings a second from which a file is a series: cycles of machines are longer than a millisecond."""
+
+SMOOTH, OSCILLATIONS = 0.5, 8
+"""Correlation of neighbouring readings, or of their differences, from which they lie on a curve, and the times that it
+must swing. Peaks of a record that drifts or changes its regime are correlated, but do not swing."""
+
+AT_REST, SMALL = 0.2, 0.05
+"""Share of the readings that are small in a series of impacts, and what is small, as a share of the largest ones."""
+
+
+class KindOfFile(NamedTuple):
+    """What a file holds, and why it is taken for that."""
+
+    kind: Kind
+    why: str
+
+
+def kind_of(
+    recording: Recording, values: Array, *, stated: Kind | None = None, of_series: str | None = None
+) -> KindOfFile:
+    """Tell whether a file holds one reading a cycle or a series over time.
+
+    Parameters
+    ----------
+    recording
+        What was read.
+    values : (n,)
+        Readings of the column that is judged; missing ones are nan.
+    stated
+        The kind, where a person states it.
+    of_series
+        What else is stated that only a series has, in words: "a cycle of 33 ms".
+
+    Raises
+    ------
+    DiagnosisError
+        If the file leaves it open; says what to state.
+
+    Examples
+    --------
+    >>> from chaosgym.recordings.kind import kind_of
+    >>> recording = chaosgym.read_recording("docs/data/peaks.csv")
+    >>> kind_of(recording, recording.columns["upper"])
+    KindOfFile(kind='peaks', why='the file states neither a rate nor times')
+    """
+    if stated is not None:
+        return KindOfFile(stated, "as stated")
+    if of_series is not None:
+        return KindOfFile("series", f"{of_series} is stated")
+    try:
+        rate, told = _rate(recording)
+    except DiagnosisError as error:
+        raise DiagnosisError(f"{error}; or state --as peaks for one reading a cycle") from error
+    sampled = looks_sampled(values)
+    if rate is None:
+        if sampled:
+            raise DiagnosisError(
+                f"{recording.source} states no sampling rate, but its readings {sampled}, as a series does; state the "
+                "rate (--rate-hz), or --as peaks for one reading a cycle"
+            )
+        return KindOfFile("peaks", "the file states neither a rate nor times")
+    if rate >= FAST or sampled:
+        return KindOfFile("series", told)
+    raise DiagnosisError(
+        f"{recording.source} may hold a series or one reading a cycle: {told}, {rate:.3g} readings a second, which lie "
+        "on no curve; state --as peaks, or --as series"
+    )
+
+
+def _rate(recording: Recording) -> tuple[float | None, str]:
+    """Readings a second [Hz], and where they are from; None where the file states neither a rate nor times.
+
+    Raises
+    ------
+    DiagnosisError
+        If there are times that can't be used.
+    """
+    if recording.rate_hz is not None:
+        return recording.rate_hz, f"the file states a rate of {recording.rate_hz:.6g} Hz"
+    time = choose_time(recording, told=bool(recording.rates))
+    if time is None and recording.rates:
+        listed = ", ".join(f"{key} = {rate:.6g} Hz" for key, rate in recording.rates.items())
+        return max(recording.rates.values()), f"the file states rates: {listed}"
+    if time is None:
+        return None, ""
+    steps = np.diff(time.values[np.isfinite(time.values)])
+    step = float(np.median(steps)) if len(steps) else 0.0
+    return (1.0 / step if step > 0.0 else np.inf), f"the file has times in column {time.name!r}"
+
+
+def looks_sampled(values: Array) -> str:
+    """In what way readings lie as samples of a cycle do, in words; empty where they do not.
+
+    Readings once a cycle of a steady machine jump from one to the next. Samples, eight or more a cycle, swing from one
+    side to the other on a curve, or rest between impacts.
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> from chaosgym.recordings.kind import looks_sampled
+    >>> looks_sampled(50.0 + np.sin(0.3 * np.arange(300)))
+    'lie on a curve that swings'
+    >>> looks_sampled(np.tile([40.0, 60.0, 50.0], 100))
+    ''
+    """
+    readings = values[np.isfinite(values)]
+    largest = float(np.max(np.abs(readings), initial=0.0))
+    if len(readings) < 8 * OSCILLATIONS or not largest:
+        return ""
+    readings = readings / largest
+    sizes = np.sort(np.abs(readings))
+    large = float(sizes[-OSCILLATIONS])  # a few wrong readings may be larger
+    if min(-np.quantile(readings, 0.02), np.quantile(readings, 0.98)) > SMALL * large:
+        return "swing about zero"
+    if np.mean(sizes < SMALL * large) > AT_REST:
+        return "rest between impacts"
+    low, high = np.quantile(readings, [0.02, 0.98])
+    above = readings > 0.5 * (low + high)
+    swings = np.count_nonzero(above[1:] != above[:-1]) / 2
+    smooth = max(_correlation(readings), _correlation(np.diff(readings))) > SMOOTH
+    return "lie on a curve that swings" if smooth and swings >= OSCILLATIONS else ""
+
+
+def _correlation(values: Array) -> float:
+    """Correlation of each value with the next within most quarters of the record; 0 where all are equal."""
+    return float(np.median([_of_neighbours(part) for part in np.array_split(values, 4)]))
+
+
+def _of_neighbours(values: Array) -> float:
+    away = values - values.mean()
+    size = float(np.dot(away, away))
+    return float(np.dot(away[1:], away[:-1])) / size if size > 0.0 else 0.0
