@@ -51,7 +51,7 @@ PATTERN, LONGEST_PATTERN, SEEN = 2.0, 32, 12
 """Standard deviation of a pattern in those of the scatter around it, its longest period, and how often it is seen."""
 
 WITHIN = 1.02
-"""Factor by which a reading may exceed the stated largest error; more where a trend was taken out, which is less sure."""
+"""Factor by which a reading may exceed the stated largest error; more where a trend was taken out, for it is unsure."""
 
 LONG_PATTERN = 3.0
 """Standard deviation of readings in those of what a pattern leaves that is seen three to eleven times."""
