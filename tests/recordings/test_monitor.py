@@ -104,7 +104,7 @@ SCATTERS = {
 @pytest.mark.parametrize("stated", [0.4, None])
 @pytest.mark.parametrize("kind", SCATTERS)
 def test_the_scatter_of_the_process_is_no_alarm_whatever_is_stated(kind, stated):
-    """Noise of many kinds beside a sensor of 0.4 N, stated rightly or not: no alarm in 1,000 cycles of four machines."""
+    """Noise of many kinds, and a sensor of 0.4 N, stated or not: no alarm in 1,000 cycles of four records."""
     for seed in range(4):
         rng = np.random.default_rng(seed)
         peaks = 100.0 + SCATTERS[kind](rng, 1000) + rng.uniform(-0.4, 0.4, 1000)

@@ -145,7 +145,7 @@ def judge_peaks(
     if line is not None and is_sampling_beat(line, len(whole), sampled):
         verdict = _of_sampling(verdict, line)
     heights = readings[np.array(outliers, int) - 1] - np.median(readings)
-    seen = () if found is None else describe(found, line, outliers, heights, changes, sampled)
+    seen = () if found is None else describe(whole, found, line, outliers, heights, changes, sampled)
     if verdict.diagnosis.nature == "undetermined" and any(feature.kind == "levels" for feature in seen):
         asked = ("what switches between its two levels", *verdict.diagnosis.tells_more)
         verdict = replace(verdict, diagnosis=replace(verdict.diagnosis, tells_more=asked))

@@ -6,9 +6,9 @@ The rule is a cumulative sum (E. S. Page, Biometrika 41, 1954) for every lag k o
 
 Two readings of a repeating response differ by 2e at the most, and by a third of that on average, so that the sum of its
 period stays near zero; of an irregular response all sums grow. The alarm goes on where the least of them exceeds LIMIT,
-and off where it has sunk below a third of that. The first 64 cycles tell how much the process scatters, whatever error is
-stated, so that the alarm tells of what is new. What can be forecast by the last readings, better than by a line, is no
-scatter: chaos from the start on raises the alarm where an error is stated.
+and off where it has sunk below a third of that. The first 64 cycles tell how much the process scatters, whatever error
+is stated, so that the alarm tells of what is new. What the last readings forecast better than a line is no scatter:
+chaos from the start on raises the alarm where an error is stated.
 """
 
 import math
@@ -52,8 +52,8 @@ FORECAST, LINEAR, ASKED = 4.0, 3, 24
 from which it is asked for; noise has one of 2."""
 
 LARGE, LASTS, RECENT = 8.0, 96, 40
-"""Beyond a learned scatter: factor by which recent readings exceed it, or cycles for which they do, from which they are no
-burst; and how many recent readings are asked whether they are deterministic."""
+"""Beyond a learned scatter: factor by which recent readings exceed it, or cycles for which they do, from which they are
+no burst; and how many recent readings are asked whether they are deterministic."""
 
 BURST, BLOCKS = 1.3, 4
 """Factor by which a quarter of the first cycles may scatter by more than all, beyond which the largest is learned."""
