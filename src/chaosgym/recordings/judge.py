@@ -140,10 +140,15 @@ def judge_peaks(
         notes.insert(0, f"the response changes at cycle {changes[0]}")
     found = scatter_of(whole, resolved / math.sqrt(3.0)) if np.ptp(whole) > 0.0 else None
     line = on_line if fixed or found is None or found.random else line_of(found.level)
+    if verdict.diagnosis.nature != "undetermined" and "line_cycles" not in verdict.diagnosis.evidence:
+        line = None
     if line is not None and is_sampling_beat(line, len(whole), sampled):
         verdict = _of_sampling(verdict, line)
     heights = readings[np.array(outliers, int) - 1] - np.median(readings)
-    seen = () if found is None else describe(found, line, outliers, heights, changes, sampled)
+    seen = () if found is None else describe(whole, found, line, outliers, heights, changes, sampled)
+    if verdict.diagnosis.nature == "undetermined" and any(feature.kind == "levels" for feature in seen):
+        asked = ("what switches between its two levels", *verdict.diagnosis.tells_more)
+        verdict = replace(verdict, diagnosis=replace(verdict.diagnosis, tells_more=asked))
     return replace(verdict, outliers=outliers, gaps=gaps, changes=changes, description=seen, notes=tuple(notes))
 
 
