@@ -21,7 +21,6 @@ from chaosgym.recordings.description import Sampled, describe, is_sampling_beat
 from chaosgym.recordings.fixed_motion import Line, line_of
 from chaosgym.recordings.measured_verdict import MeasuredVerdict
 from chaosgym.recordings.scatter import judge_scatter, newton, scatter_of
-from chaosgym.recordings.sensors import judge_together
 from chaosgym.series.noise import FEW_OUTLIERS, SensorError, equal_interval, find_change, quantum, repair, stated_error
 from chaosgym.series.two_step import INITIAL_TRANSIENT, two_step_test
 from chaosgym.series.verdict import Diagnosis, undetermined
@@ -81,6 +80,8 @@ def judge_peaks(
     'periodic, period 2'
     """
     if np.ndim(peaks) == 2:
+        from chaosgym.recordings.sensors import judge_together
+
         table = np.asarray(peaks, dtype=float)
         if not table.shape[1]:
             raise DiagnosisError(f"the record has shape {table.shape}; allowed: (cycles,) or (cycles, sensors)")
