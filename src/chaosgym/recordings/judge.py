@@ -211,7 +211,8 @@ def _apart_from(verdict: MeasuredVerdict, condition: str) -> MeasuredVerdict:
     if verdict.diagnosis.nature == "undetermined":
         return verdict
     conditions = " and ".join(filter(None, (condition, verdict.diagnosis.condition)))
-    return replace(verdict, diagnosis=replace(verdict.diagnosis, condition=conditions))
+    diagnosis = replace(verdict.diagnosis, condition=conditions)
+    return replace(verdict, diagnosis=diagnosis, random=verdict.random or diagnosis.nature == "periodic")
 
 
 def _accounts_for(verdict: MeasuredVerdict, readings: Array) -> bool:

@@ -248,7 +248,7 @@ def _on_line(found: Scatter, line: Line, told: SensorError | None, most: float |
     )
     error = told or SensorError(3.0 * line.rest, line.rest, "estimated")
     share = line.rest / found.mean if found.mean else 0.0
-    return MeasuredVerdict(diagnosis, error, scatter=line.rest, coefficient_of_variation=share, random=True)
+    return MeasuredVerdict(diagnosis, error, scatter=line.rest, coefficient_of_variation=share, random=not own)
 
 
 def _torus_of(found: Scatter, told: SensorError | None, most: float | None, resolved: float) -> MeasuredVerdict | None:
@@ -503,7 +503,7 @@ def _two_lines(found: Scatter, most: float, told: SensorError | None) -> Measure
         evidence={"cycles": size, **found.evidence(), "spectral_lines": FEW_LINES},
         condition=f"if its two lines in {size} cycles are the machine's own",
     )
-    return MeasuredVerdict(diagnosis, told or SensorError(3.0 * sigma, sigma, "estimated"), scatter=sigma, random=True)
+    return MeasuredVerdict(diagnosis, told or SensorError(3.0 * sigma, sigma, "estimated"), scatter=sigma)
 
 
 def newton(force: float) -> str:
