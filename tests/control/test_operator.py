@@ -150,3 +150,19 @@ def test_speeds_stay_within_the_drive():
     task = operator.task
     assert task.lowest_speed == min(speeds) < max(speeds) == task.highest_speed
     assert np.abs(np.diff(speeds)).max() <= task.slew_limit
+
+
+def test_a_measured_speed_that_scatters_is_the_speed_that_was_set():
+    """Backing off leaves an irregular demand where the tachometer errs by 0.02 Hz, as where it does not."""
+    random, speeds = np.random.default_rng(2), []
+    for error in (0.0, 0.02):
+        operator = chaosgym.Operator(BackOff(), BEAM)
+        operator.start(speed=20.0, demand=20.0)
+        speeds.append(
+            [
+                operator.next([60.0, 90.0, 75.0] * 4, speed=operator.speed + error * random.uniform(-1, 1))
+                for _ in range(9)
+            ]
+        )
+    assert speeds[0] == speeds[1]
+    assert len(set(speeds[0])) > 2

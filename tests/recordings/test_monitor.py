@@ -84,6 +84,45 @@ def pink(rng, cycles):
     return made / made.std()
 
 
+def volatile(rng, cycles):
+    """GARCH(1, 1), Bollerslev (1986), with a standard deviation of 1: scatter that comes in bursts."""
+    made, variance = np.empty(cycles), 1.0
+    for cycle in range(cycles):
+        made[cycle] = np.sqrt(variance) * rng.normal()
+        variance = 0.05 + 0.2 * made[cycle] ** 2 + 0.75 * variance
+    return made / made.std()
+
+
+SCATTERS = {
+    "pink 1 %": pink,
+    "white 6 %": lambda rng, n: 6.0 * rng.normal(size=n),
+    "hum 2 %": lambda rng, n: 2.0 * np.sin(2.0 * np.pi * rng.uniform(0.05, 0.45) * np.arange(n)),
+    "bursts 4 %": lambda rng, n: 4.0 * volatile(rng, n),
+}
+
+
+@pytest.mark.parametrize("stated", [0.4, None])
+@pytest.mark.parametrize("kind", SCATTERS)
+def test_the_scatter_of_the_process_is_no_alarm_whatever_is_stated(kind, stated):
+    """Noise of many kinds, and a sensor of 0.4 N, stated or not: no alarm in 1,000 cycles of four records."""
+    for seed in range(4):
+        rng = np.random.default_rng(seed)
+        peaks = 100.0 + SCATTERS[kind](rng, 1000) + rng.uniform(-0.4, 0.4, 1000)
+        assert "alarm" not in [seen.event for seen in Monitor(stated).watch(np.maximum(peaks, 0.0))]
+
+
+@pytest.mark.parametrize(("noise", "size", "within"), [(0.0, 1.0, 30), (1.0, 5.0, 60)])
+def test_chaos_that_begins_is_new(noise, size, within):
+    """Chaos of 1 % is noticed after 30 cycles, and of 5 % under pink noise of 1 % within 60, the error stated."""
+    for seed in range(6):
+        rng = np.random.default_rng(seed)
+        chaos = settled(3.9, 200)
+        peaks = 100.0 + noise * pink(rng, 400) + rng.uniform(-0.4, 0.4, 400)
+        peaks[200:] += size * (chaos - chaos.mean()) / chaos.std()
+        alarms = [seen.cycle for seen in Monitor(0.4).watch(peaks) if seen.event == "alarm"]
+        assert 200 < alarms[0] <= 200 + within
+
+
 @pytest.mark.parametrize("kind", ["pink, learned", "normal, learned", "sensor 1.5 times worse", "periods 9, 12 and 16"])
 def test_harmless_scatter_raises_no_alarm_in_thousands_of_cycles(kind):
     """Pink noise of 1 % with a learned error, a sensor that is worse than told, and long periods: no alarm."""

@@ -125,8 +125,9 @@ def follow_bifurcation(
     >>> from chaosgym.branches.bifurcation_curve import follow_bifurcation
     >>> beam = chaosgym.ImpactBeam()
     >>> diagram = chaosgym.follow(beam, "speed", (20.0, 20.3))
-    >>> first = next(one for one in diagram.bifurcations if one.loses_stability)
-    >>> curve = follow_bifurcation(beam, first, "speed", "clearance", (1.2e-4, 1.3e-4), steps=3)
+    >>> folds = [one for one in diagram.bifurcations if one.kind == "fold" and one.period == 1]
+    >>> fold = next(one for one in folds if one.value > 20.2)  # rounding decides whether narrower ones are met
+    >>> curve = follow_bifurcation(beam, fold, "speed", "clearance", (1.2e-4, 1.3e-4), steps=3)
     >>> curve.kind
     'fold'
     """

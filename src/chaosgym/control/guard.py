@@ -80,7 +80,7 @@ class GuardedPolicy(Controller):
     @property
     def keywords(self) -> dict[str, Any]:
         """Of the environment: that of a controller, and what the policy observes."""
-        return self.policy.keywords | super().keywords
+        return {**self.policy.keywords, **super().keywords}
 
     def begin(self, envs: Any) -> None:
         """Begin with trust in the policy, and no reading."""

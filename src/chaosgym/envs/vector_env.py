@@ -294,7 +294,7 @@ class MachineVectorEnv(JobSpec, gym.vector.VectorEnv[Observation, Actions, NDArr
             return [None] * self.num_envs
         if isinstance(seed, int | np.integer):
             return [int(seed) + i for i in range(self.num_envs)]
-        seeds = list(seed) if np.ndim(seed) == 1 else []
+        seeds: list[int | None] = list(seed) if hasattr(seed, "__len__") else []
         if len(seeds) != self.num_envs or not all(one is None or isinstance(one, int | np.integer) for one in seeds):
             raise ParameterError(
                 f"seed = {seed!r} is not usable; allowed: one whole number, or {self.num_envs} whole numbers or None"

@@ -21,8 +21,9 @@ MULTIPLES = 3
 LEVELS_APART, LEAST_STAY = 8.0, 0.05
 """Distance of two levels in standard deviations around them, and the share of the cycles that each holds at least."""
 
-BURSTS = 5.0
-"""Correlation of the sizes of successive scatter, times the root of the cycles, from which it comes in bursts."""
+BURSTS, STRETCH = 5.0, 20
+"""Correlation of the sizes of successive scatter, times the root of the cycles, from which it comes in bursts, and the
+cycles over which their standard deviation is told."""
 
 
 class Sampled(NamedTuple):
@@ -33,6 +34,7 @@ class Sampled(NamedTuple):
 
 
 def describe(
+    values: Array,
     found: Scatter,
     line: Line | None,
     outliers: tuple[int, ...] = (),
@@ -44,8 +46,10 @@ def describe(
 
     Parameters
     ----------
+    values : (cycles,)
+        Readings.
     found
-        The readings, their pattern and their trends.
+        The same without drift, their pattern and their trends.
     line
         The one line that accounts for them, if there is one.
     outliers
@@ -63,10 +67,10 @@ def describe(
     >>> from chaosgym.recordings.scatter import scatter_of
     >>> pattern = 50.0 + np.random.default_rng(0).normal(size=40)
     >>> readings = np.tile(pattern, 5) + 0.05 * np.random.default_rng(1).normal(size=200)
-    >>> [feature.text for feature in describe(scatter_of(readings, 0.0), None)]
+    >>> [feature.text for feature in describe(readings, scatter_of(readings, 0.0), None)]
     ['a pattern of 40 cycles, seen 5 times, to a standard deviation of 0.0486 N']
     """
-    features = [*_spikes(outliers, heights), *_steps(found.readings, changes)]
+    features = [*_spikes(outliers, heights), *_steps(values, changes)]
     if line is not None:
         features += _line(line, len(found.readings), sampled)
     elif not changes:
@@ -177,6 +181,6 @@ def _bursts(found: Scatter) -> Iterator[Feature]:
     lasts = float(np.sum(sizes[1:] * sizes[:-1])) / max(float(np.sum(sizes**2)), 1e-300) * math.sqrt(size)
     goes = abs(float(np.sum(rest[1:] * rest[:-1]))) / float(np.sum(rest**2)) * math.sqrt(size)
     if lasts > BURSTS and goes < 0.5 * lasts:
-        tenths = [float(np.std(part)) for part in np.array_split(rest, 10)]
-        text = f"its scatter comes in bursts: {newton(min(tenths))} to {newton(max(tenths))} over tenths of the record"
-        yield Feature("bursts", text, {"least": min(tenths), "largest": max(tenths)})
+        parts = [float(np.std(part)) for part in np.array_split(rest, size // STRETCH)]
+        text = f"its scatter comes in bursts: {newton(min(parts))} to {newton(max(parts))} over {STRETCH} cycles"
+        yield Feature("bursts", text, {"least": min(parts), "largest": max(parts)})

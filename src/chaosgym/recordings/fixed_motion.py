@@ -30,7 +30,7 @@ TREND_GAIN, TREND_SEEN = 0.8, 12
 """Share of the variance around a pattern that its trend may leave, and how often the pattern must be seen."""
 
 PATTERNS, FEWEST, TURNS = 8, 100, 5.0
-"""Longest pattern under a line, fewest cycles and fewest turns of the line in them: slower ones may be a random walk."""
+"""Longest pattern under a line, fewest cycles and fewest turns of it in them: a slower one may be a random walk."""
 
 FUNDAMENTAL, HARMONICS = 0.4, 4
 """Share of the variance around its pattern that one sinusoid must hold, and how many of its multiples are fitted."""

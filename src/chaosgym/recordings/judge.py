@@ -21,7 +21,6 @@ from chaosgym.recordings.description import Sampled, describe, is_sampling_beat
 from chaosgym.recordings.fixed_motion import Line, line_of
 from chaosgym.recordings.measured_verdict import MeasuredVerdict
 from chaosgym.recordings.scatter import judge_scatter, newton, scatter_of
-from chaosgym.recordings.sensors import judge_together
 from chaosgym.series.noise import FEW_OUTLIERS, SensorError, equal_interval, find_change, quantum, repair, stated_error
 from chaosgym.series.two_step import INITIAL_TRANSIENT, two_step_test
 from chaosgym.series.verdict import Diagnosis, undetermined
@@ -81,6 +80,8 @@ def judge_peaks(
     'periodic, period 2'
     """
     if np.ndim(peaks) == 2:
+        from chaosgym.recordings.sensors import judge_together
+
         table = np.asarray(peaks, dtype=float)
         if not table.shape[1]:
             raise DiagnosisError(f"the record has shape {table.shape}; allowed: (cycles,) or (cycles, sensors)")
@@ -140,10 +141,15 @@ def judge_peaks(
         notes.insert(0, f"the response changes at cycle {changes[0]}")
     found = scatter_of(whole, resolved / math.sqrt(3.0)) if np.ptp(whole) > 0.0 else None
     line = on_line if fixed or found is None or found.random else line_of(found.level)
+    if verdict.diagnosis.nature != "undetermined" and "line_cycles" not in verdict.diagnosis.evidence:
+        line = None
     if line is not None and is_sampling_beat(line, len(whole), sampled):
         verdict = _of_sampling(verdict, line)
     heights = readings[np.array(outliers, int) - 1] - np.median(readings)
-    seen = () if found is None else describe(found, line, outliers, heights, changes, sampled)
+    seen = () if found is None else describe(whole, found, line, outliers, heights, changes, sampled)
+    if verdict.diagnosis.nature == "undetermined" and any(feature.kind == "levels" for feature in seen):
+        asked = ("what switches between its two levels", *verdict.diagnosis.tells_more)
+        verdict = replace(verdict, diagnosis=replace(verdict.diagnosis, tells_more=asked))
     return replace(verdict, outliers=outliers, gaps=gaps, changes=changes, description=seen, notes=tuple(notes))
 
 
@@ -205,7 +211,8 @@ def _apart_from(verdict: MeasuredVerdict, condition: str) -> MeasuredVerdict:
     if verdict.diagnosis.nature == "undetermined":
         return verdict
     conditions = " and ".join(filter(None, (condition, verdict.diagnosis.condition)))
-    return replace(verdict, diagnosis=replace(verdict.diagnosis, condition=conditions))
+    diagnosis = replace(verdict.diagnosis, condition=conditions)
+    return replace(verdict, diagnosis=diagnosis, random=verdict.random or diagnosis.nature == "periodic")
 
 
 def _accounts_for(verdict: MeasuredVerdict, readings: Array) -> bool:

@@ -34,8 +34,9 @@ class MeasuredVerdict:
     coefficient_of_variation
         The same as a share of the mean reading.
     random
-        Whether the scatter of a periodic response is taken for that of a random process or sensor. Where it is larger
-        than a stated error, or none is stated, ``diagnosis.condition`` says that the verdict rests on this.
+        Whether a periodic response is taken to have scatter of a random process or sensor, a line from outside, or
+        spikes apart. Where these exceed a stated error, or none is stated, ``diagnosis.condition`` says that the
+        verdict rests on this.
     outliers
         Cycles, from 1, whose single readings were left out.
     gaps

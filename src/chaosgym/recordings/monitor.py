@@ -6,8 +6,9 @@ The rule is a cumulative sum (E. S. Page, Biometrika 41, 1954) for every lag k o
 
 Two readings of a repeating response differ by 2e at the most, and by a third of that on average, so that the sum of its
 period stays near zero; of an irregular response all sums grow. The alarm goes on where the least of them exceeds LIMIT,
-and off where it has sunk below a third of that. The first 64 cycles tell the error where none is stated, or
-where the sensor is up to twice as bad as stated.
+and off where it has sunk below a third of that. The first 64 cycles tell how much the process scatters, whatever error
+is stated, so that the alarm tells of what is new. What the last readings forecast better than a line is no scatter:
+chaos from the start on raises the alarm where an error is stated.
 """
 
 import math
@@ -22,6 +23,7 @@ import numpy as np
 
 from chaosgym.arrays import Array, Indices
 from chaosgym.errors import ChaosgymError, DiagnosisError
+from chaosgym.series.noise import predictability
 from chaosgym.series.stroboscopic import irregularity
 
 Event = Literal["", "change", "alarm", "all clear", "dead sensor", "missing"]
@@ -41,9 +43,20 @@ HIGHEST = LIMIT + 2.0
 NO_REPEAT = 1.1
 """Difference that no error explains: if it is seen at every lag at once, the regime has changed."""
 
-LEARNED, TRIED, WORSE = 64, 48, (1.3, 2.0)
-"""First cycles by which the error is learned, those by which a stated one is tried, and how many times worse than
-stated a sensor is taken as it is."""
+LEARNED, TRIED, QUIET = 64, 32, 1.5
+"""First cycles by which the scatter is learned, those after which a stated error may be trusted, and how many times it
+the scatter then is at most."""
+
+FORECAST, LINEAR, ASKED = 4.0, 3, 24
+"""Predictability of what a linear forecast from three readings leaves above which motion is deterministic, and readings
+from which it is asked for; noise has one of 2."""
+
+LARGE, LASTS, RECENT = 8.0, 96, 40
+"""Beyond a learned scatter: factor by which recent readings exceed it, or cycles for which they do, from which they are
+no burst; and how many recent readings are asked whether they are deterministic."""
+
+BURST, BLOCKS = 1.3, 4
+"""Factor by which a quarter of the first cycles may scatter by more than all, beyond which the largest is learned."""
 
 EVEN, SLACK, SAME = 1.5, 1.1, 1.5
 """Half width of an even error in mean differences of two readings, what is added to one that is learned, and the factor
@@ -86,6 +99,10 @@ class RepeatSums:
         self._last[which] = np.concatenate([peaks[:, None], last[:, :-1]], axis=1)
         self.cycles[which] += 1
         return gaps
+
+    def quieten(self, which: Indices) -> None:
+        """Set the sums of the sensors ``which`` (k,) to zero, and keep their last readings."""
+        self._sums[which] = 0.0
 
     def level(self, which: Indices) -> Array:
         """Least sum over its limit, (k,); 0 until every lag has been measured twice."""
@@ -142,8 +159,8 @@ class Monitor:
     Parameters
     ----------
     sensor_error
-        Largest error of a peak [N], above 0. Without it the first 64 cycles, which are taken for regular, tell it. A
-        sensor that scatters up to twice as much in them is taken as it is.
+        Largest error of a peak [N], above 0. The first 64 cycles tell the scatter of the process, if it is larger or
+        no error is stated; without an error they are taken for regular.
     longest_period
         Longest period [cycles] that counts as repeating; the first verdict comes after twice as many cycles.
     on_event
@@ -186,6 +203,9 @@ class Monitor:
         self._since: deque[float] = deque(maxlen=WINDOW)
         self._first: list[float] = []
         self._equal, self._differed = 1, False
+        self._trusted = self.stated is not None
+        self._recent: deque[float] = deque(maxlen=RECENT)
+        self._over = 0
 
     @property
     def state(self) -> dict[str, Any]:
@@ -204,6 +224,7 @@ class Monitor:
         if not (math.isfinite(peak) and peak >= 0.0):
             raise DiagnosisError(f"cycle {self.cycle + 1}: peak = {peak:g} N; allowed: finite forces of 0 N and more")
         died = self._note_equal(float(peak))
+        self._recent.append(float(peak))
         self._learn(float(peak))
         gaps = self._sums.add(FIRST, np.array([float(peak)]), self.sensor_error or math.inf)
         # a gap to a peak that is not known yet is NaN, and larger than nothing
@@ -215,6 +236,8 @@ class Monitor:
         ready = self.cycle > 2 * self.longest_period and self.sensor_error is not None
         level = float(self._sums.level(FIRST)[0])
         before, self.alarm = self.alarm, level > (CLEAR / LIMIT if self.alarm else 1.0)
+        self._over = self._over + 1 if self.alarm else 0
+        self.alarm = self.alarm and (before or self._is_new())
         event: Event = "change" if changed and ready else "dead sensor" if died else ""
         if self.alarm != before:
             event = "alarm" if self.alarm else "all clear"
@@ -242,27 +265,56 @@ class Monitor:
         return self.dead and not before
 
     def _learn(self, peak: float) -> None:
-        """Take the error from the first cycles where it is not stated, or the sensor is worse than stated."""
-        wanted = LEARNED if self.stated is None else TRIED
-        if len(self._first) >= wanted:
+        """Take the scatter of the first cycles for the error, if none is stated or it is larger and no chaos."""
+        if len(self._first) >= LEARNED:
             return
         self._first.append(peak)
-        if len(self._first) < wanted:
-            return
         seen = np.array(self._first)
-        longest = min(self.longest_period, wanted // 2)
-        means = np.array([float(np.mean(np.abs(seen[k:] - seen[:-k]))) for k in range(1, longest + 1)])
-        period = int(np.flatnonzero(means <= SAME * means.min())[0]) + 1
-        learned = SLACK * EVEN * float(means[period - 1 :: period].mean())
+        if self.stated is not None and len(seen) == TRIED:
+            self._trusted = self._scatter(seen) <= QUIET * self.stated
+        if len(seen) < LEARNED:
+            return
+        learned = self._scatter(seen)
         if self.stated is None:
             self.sensor_error = max(learned, 1e-6 * float(np.max(seen)), 1e-300)
-        elif WORSE[0] * self.stated < learned <= WORSE[1] * self.stated and not self.alarm:
+        elif not self._trusted and learned > self.stated and not self.alarm and not _is_deterministic(seen):
             self.sensor_error = learned
+            self._sums.quieten(FIRST)
+        self._trusted = True
+
+    def _is_new(self) -> bool:
+        """Whether scatter beyond the error is none that the process has from the start, and no burst of it."""
+        recent, error = np.array(self._recent), self.sensor_error
+        if self.stated is not None and len(self._first) < LEARNED:
+            return (self._trusted and len(self._first) >= TRIED) or _is_deterministic(recent)
+        if error is None or error == self.stated or self._over > LASTS:
+            return True
+        return self._scatter(recent[-2 * self.longest_period :]) > LARGE * error or _is_deterministic(recent)
+
+    def _scatter(self, seen: Array) -> float:
+        """Largest error by the differences of readings (cycles,) one period apart, of the quarter with the most."""
+        longest = min(self.longest_period, len(seen) // 2)
+        means = np.array([float(np.mean(np.abs(seen[k:] - seen[:-k]))) for k in range(1, longest + 1)])
+        period = int(np.flatnonzero(means <= SAME * means.min())[0]) + 1
+        typical = float(means[period - 1 :: period].mean())
+        quarters = np.array_split(np.abs(seen[period:] - seen[:-period]), BLOCKS)
+        bursts = max(float(np.mean(quarter)) for quarter in quarters) / max(float(means[period - 1]), 1e-300)
+        return SLACK * EVEN * typical * max(1.0, bursts / BURST)
 
     def watch(self, peaks: Any) -> Iterator[Watch]:
         """Update with every peak of a series, one after the other."""
         for peak in peaks:
             yield self.update(float(peak))
+
+
+def _is_deterministic(seen: Array) -> bool:
+    """Whether the last readings (cycles,) forecast what a line of them leaves."""
+    if len(seen) < ASKED or np.ptp(seen) == 0.0:
+        return False
+    windows = np.lib.stride_tricks.sliding_window_view(seen, LINEAR + 1)
+    design = np.column_stack([np.ones(len(windows)), windows[:, :-1]])
+    rest = windows[:, -1] - design @ np.linalg.lstsq(design, windows[:, -1], rcond=None)[0]
+    return predictability(seen[LINEAR:], rest) > FORECAST
 
 
 class EventLog(AbstractContextManager["EventLog"]):

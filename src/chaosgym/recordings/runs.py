@@ -15,13 +15,11 @@ from chaosgym.arrays import Array
 from chaosgym.errors import ChaosgymError, DiagnosisError
 from chaosgym.numbers import summary
 from chaosgym.recordings.columns import Signal, check_peaks, choose_force, forces, named_columns
-from chaosgym.recordings.cycles import peaks_of_series
 from chaosgym.recordings.description import Sampled
 from chaosgym.recordings.judge import judge_peaks
 from chaosgym.recordings.kind import Kind, kind_of
 from chaosgym.recordings.measured_verdict import MeasuredVerdict
 from chaosgym.recordings.read import Recording, read_recording
-from chaosgym.recordings.sensors import judge_together
 
 
 class InUnit(float):
@@ -288,7 +286,9 @@ def ask_for_force(source: str, signal: Signal) -> None:
 
 
 def _of_series(recording: Recording, name: str | None, options: RecordingOptions, why: str, of_force: bool) -> Run:
-    """One column of a series, cut into cycles."""
+    """One column of a series, cut into cycles, which a file of peaks does without."""
+    from chaosgym.recordings.cycles import peaks_of_series
+
     signal, cut = peaks_of_series(
         recording,
         name,
@@ -367,6 +367,8 @@ def _together(runs: tuple[Run, ...]) -> MeasuredVerdict | None:
     """The verdict on all columns of a file of peaks, which are the sensors of one machine; else None."""
     if len(runs) < 2 or not all(run.aligned for run in runs) or len({len(run.peaks) for run in runs}) > 1:
         return None
+    from chaosgym.recordings.sensors import judge_together
+
     return judge_together(
         [run.verdict for run in runs], np.column_stack([run.peaks for run in runs]), [run.name for run in runs]
     )

@@ -51,7 +51,7 @@ PATTERN, LONGEST_PATTERN, SEEN = 2.0, 32, 12
 """Standard deviation of a pattern in those of the scatter around it, its longest period, and how often it is seen."""
 
 WITHIN = 1.02
-"""Factor by which a reading may exceed the stated largest error; more where a trend was taken out, which is less sure."""
+"""Factor by which a reading may exceed the stated largest error; more where a trend was taken out, for it is unsure."""
 
 LONG_PATTERN = 3.0
 """Standard deviation of readings in those of what a pattern leaves that is seen three to eleven times."""
@@ -196,7 +196,8 @@ def _judge(found: Scatter, told: SensorError | None, resolved: float) -> Measure
     most = None if told is None else _most(found, told, resolved)
     line = None if found.random and found.period == 1 else line_of(found.level)
     if line is not None and _better(line, found):
-        return _torus_of(found, told, most, resolved) or _on_line(found, line, told, most)
+        several = _torus_of(found, told, most, resolved) if len(found.readings) >= QUASIPERIODIC_CYCLES else None
+        return several or _on_line(found, line, told, most)
     if most is not None and found.sigma <= most:
         assert told is not None
         return _within_error(found, told, resolved)
@@ -247,7 +248,7 @@ def _on_line(found: Scatter, line: Line, told: SensorError | None, most: float |
     )
     error = told or SensorError(3.0 * line.rest, line.rest, "estimated")
     share = line.rest / found.mean if found.mean else 0.0
-    return MeasuredVerdict(diagnosis, error, scatter=line.rest, coefficient_of_variation=share, random=True)
+    return MeasuredVerdict(diagnosis, error, scatter=line.rest, coefficient_of_variation=share, random=not own)
 
 
 def _torus_of(found: Scatter, told: SensorError | None, most: float | None, resolved: float) -> MeasuredVerdict | None:
@@ -488,6 +489,8 @@ def _two_lines(found: Scatter, most: float, told: SensorError | None) -> Measure
     size = len(found.readings)
     if size < ENOUGH_CYCLES or found.forecast < 2.0 * RANDOM:
         return None
+    if is_random(without_lines(found.level, 1, 0.0)[0]):
+        return None
     rest, _ = without_lines(found.level, FEW_LINES, 0.0)
     sigma = float(np.std(rest))
     if sigma > min(most, TORUS_REST * float(np.std(found.level))) or not is_random(rest):
@@ -500,7 +503,7 @@ def _two_lines(found: Scatter, most: float, told: SensorError | None) -> Measure
         evidence={"cycles": size, **found.evidence(), "spectral_lines": FEW_LINES},
         condition=f"if its two lines in {size} cycles are the machine's own",
     )
-    return MeasuredVerdict(diagnosis, told or SensorError(3.0 * sigma, sigma, "estimated"), scatter=sigma, random=True)
+    return MeasuredVerdict(diagnosis, told or SensorError(3.0 * sigma, sigma, "estimated"), scatter=sigma)
 
 
 def newton(force: float) -> str:

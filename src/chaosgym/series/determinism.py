@@ -118,7 +118,7 @@ class Determinism(NamedTuple):
     @property
     def resting_period(self) -> int | None:
         """Period of the map without noise, two at least, where it accounts for the readings; else None."""
-        rests = np.quantile(self.exponents, 0.9) < REST_SURELY
+        rests = self.map_rests and np.quantile(self.exponents, 0.9) < REST_SURELY
         return self.period if self._accounts and rests and (self.period or 1) > 1 else None
 
     @property

@@ -53,7 +53,7 @@ class BackOff(Controller):
         """The demand and the offset."""
         demand, speed, every = seen(observations, "demand"), seen(observations, "speed"), np.arange(self.count)
         wanted = np.clip(self._demand + self.ladder[self._rung], self.task.lowest_speed, self.task.highest_speed)
-        there = np.abs(speed - wanted) < 0.01 * self.task.trim_step
+        there = np.abs(speed - wanted) < 0.3 * self.task.trim_step
         wild = irregular(observations, self.task, THRESHOLD, 1e-3) > 0.5
         new = demand != self._demand
         self._demand = demand
