@@ -391,9 +391,8 @@ class _Search:
         self._watches = watches
         self._machine, self._budget, self._workers = machine, budget, workers
         with np.errstate(divide="ignore"):
-            self._weight = np.where(box.scale > 0.0, 1.0 / box.scale, 0.0) / math.sqrt(
-                max(np.count_nonzero(box.scale), 1)
-            )
+            weight = np.where(box.scale > 0.0, 1.0 / box.scale, 0.0)
+        self._weight = weight / math.sqrt(int(np.count_nonzero(weight)) or 1)
         self.motions: list[Attractor] = []
         self._diagnoses = 0
         self._places: dict[int, int] = {}

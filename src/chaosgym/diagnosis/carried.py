@@ -51,7 +51,7 @@ def carried_states(machine: Machine, stops: Sequence[float] = ()) -> Carried:
     --------
     >>> from chaosgym.diagnosis.carried import carried_states
     >>> list(carried_states(chaosgym.ImpactBeam(excitation_frequency=10.0)).here)
-    ['run-up from 6 Hz', 'run-down from 30 Hz']
+    ['run-up from 4 Hz', 'run-down from 30 Hz']
     """
     name = machine.speed_field
     own, unit = float(getattr(machine, name)), parameters_of(machine)[name].unit
