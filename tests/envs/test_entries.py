@@ -2,6 +2,7 @@
 
 import json
 from dataclasses import dataclass
+from types import SimpleNamespace
 
 import gymnasium as gym
 import numpy as np
@@ -152,8 +153,8 @@ def test_a_controller_adds_what_the_motor_slipped():
     """The set-point is read by its name: following a demand of 20 from 3 below a set-point asks for 23."""
     task = WiderTask(drive="motor", classifier="on", smallest="on")
     controller = Follow()
-    controller.task = task
-    row = dict.fromkeys(task.places, -1.0) | {"demand": 20.0, "speed": 17.0, "set_point": 20.0}
+    controller.start(SimpleNamespace(task=task, num_envs=1))
+    row = dict.fromkeys(task.places, -1.0) | {"mean_peak_force": 80.0, "demand": 20.0, "speed": 17.0, "set_point": 20.0}
     assert controller(np.array([[row[name] for name in task.places]], np.float32)) == 23.0
 
 

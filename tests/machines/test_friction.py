@@ -428,7 +428,10 @@ def test_the_exponent_of_a_proven_orbit_is_that_of_its_multipliers(tmp_path):
 
 @pytest.mark.parametrize(("friction", "speed", "chaotic"), [(0.1, 16.0, True), (0.2, 12.0, False)])
 def test_the_exponent_is_that_of_two_nearby_runs(tmp_path, friction, speed, chaotic):
-    """Two runs that are drawn together again after each cycle part as the deviation grows, in chaos and out of it."""
+    """Two runs that are drawn together again after each cycle part as the deviation grows, in chaos and out of it.
+
+    Over the same cycles, as the mean over others differs by chance. Two directions take a few cycles to become one.
+    """
     blade = replace(read(tmp_path), joint_friction=friction, speed=speed)
     state = simulate(blade, 1, transient=300).final_state
     weights = blade.state_weights(state.coordinates)
@@ -440,8 +443,8 @@ def test_the_exponent_is_that_of_two_nearby_runs(tmp_path, friction, speed, chao
         size = float(np.linalg.norm(moved * weights))
         growth += math.log(size / apart) / 500
         direction = moved / size
-    found = largest_lyapunov_exponent(blade, 1500, transient=300)
-    assert found.per_cycle == pytest.approx(growth, abs=0.06)
+    found = largest_lyapunov_exponent(blade, 500, transient=300)
+    assert found.per_cycle == pytest.approx(growth, abs=0.02)
     assert (growth > 0.5) == chaotic
 
 

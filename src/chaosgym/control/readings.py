@@ -29,15 +29,14 @@ HOLD = 0
 def usable(observations: NDArray[Any], task: Task) -> NDArray[np.bool_]:
     """Which observations (n, entries) have a usable reading, (n,).
 
-        Examples
-        --------
-        >>> from chaosgym.control.readings import usable
-        >>> from chaosgym.envs.task import Task
-    from chaosgym.errors import ParameterError
-        >>> observations = np.full((3, 14), 20.0)
-        >>> observations[1, 6], observations[2, 9] = 1e9, np.nan  # mean peak force [N], repeat_1
-        >>> usable(observations, Task())
-        array([ True, False, False])
+    Examples
+    --------
+    >>> from chaosgym.control.readings import usable
+    >>> from chaosgym.envs.task import Task
+    >>> observations = np.full((3, 14), 20.0)
+    >>> observations[1, 6], observations[2, 9] = 1e9, np.nan  # mean peak force [N], repeat_1
+    >>> usable(observations, Task())
+    array([ True, False, False])
     """
     mean = observations[:, PLACE.mean_peak_force]
     plausible = (mean > 0.0) & (mean < np.float32(FORCE_RANGE * task.reference_force))

@@ -68,7 +68,7 @@ def describe(
     >>> pattern = 50.0 + np.random.default_rng(0).normal(size=40)
     >>> readings = np.tile(pattern, 5) + 0.05 * np.random.default_rng(1).normal(size=200)
     >>> [feature.text for feature in describe(readings, scatter_of(readings, 0.0), None)]
-    ['a pattern of 40 cycles, seen 5 times, to a standard deviation of 0.0486 N']
+    ['a pattern of 40 cycles, seen 5 times, to a standard deviation of 0.0471 N']
     """
     features = [*_spikes(outliers, heights), *_steps(values, changes)]
     if line is not None:
