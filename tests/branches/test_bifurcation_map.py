@@ -20,6 +20,8 @@ SOFT_FILE = (
 def test_without_a_gap_motions_change_at_the_same_speed_whatever_the_force():
     """A stop at the place of rest leaves the equations homogeneous: twice the force is twice the motion.
 
+    Three flips are of motions that rest leads to; starts at random add those of coexisting motions.
+
     Exactly so: a number twice as large is rounded alike, so both rows tell the same also of chaos near a window.
     """
     found = bifurcation_map(SOFT, "speed", "drive_level", (0.38, 0.42), (0.8, 1.6), columns=5, rows=2, workers=1)
@@ -27,7 +29,7 @@ def test_without_a_gap_motions_change_at_the_same_speed_whatever_the_force():
     assert np.all(found.nature == found.nature[:, :1])
     assert np.all(found.period == found.period[:, :1])
     flips = [curve for curve in found.curves if curve.kind == "flip"]
-    assert len(flips) == 3
+    assert len(flips) >= 3
     for curve in flips:
         assert all(end.startswith("end of the range") for end in curve.ends)
         assert curve.against_values[[0, -1]] == pytest.approx([0.8, 1.6])

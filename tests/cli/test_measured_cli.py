@@ -118,7 +118,10 @@ def test_simulated_series_are_read_back(tmp_path):
     for cycle in ("27.5 Hz", "1650 rpm", "36.363636363636 ms"):
         code, out, err = run("judge", path, "--cycle", cycle, "--sensor-error", "1 N", "--json")
         assert code == 0, err
-        assert "random or chaotic, this record cannot tell" in json.loads(out)["reason"]
+        verdict = json.loads(out)
+        assert verdict["nature"] == "undetermined"
+        assert verdict["reason"].startswith("irregular beyond 1 N")
+        assert verdict["tells_more"]
     assert run("classify", "impact-beam", path, "--cycle", "27.5 Hz")[0] == 0
     assert run("judge", "--load-rating", "500 N", path, "--cycle", "27.5 Hz")[0] == 0
 

@@ -5,6 +5,7 @@ import pytest
 
 from chaosgym.diagnosis import bounce_fraction, diagnose, precursors, predictive_criteria, signs_of_chaos
 from chaosgym.diagnosis.precursors import measured_rates
+from chaosgym.diagnosis.verdict import of_machine
 from chaosgym.errors import DiagnosisError
 from chaosgym.machines import ImpactBeam
 from chaosgym.series import two_step_test
@@ -73,7 +74,7 @@ def test_signs_of_a_chaotic_response_are_the_criteria_alone():
     assert verdict.nature == "chaotic"
     assert [(sign.name, sign.present) for sign in signs_of_chaos(verdict)] == [("criteria", True)]
     with pytest.raises(DiagnosisError, match="plain series"):
-        signs_of_chaos(two_step_test([1.0, 2.0] * 20))
+        signs_of_chaos(of_machine(two_step_test([1.0, 2.0] * 20)))
 
 
 def test_subharmonics_announce_chaos_more_surely_than_bouncing():

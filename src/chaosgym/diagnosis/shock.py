@@ -19,7 +19,6 @@ from chaosgym.diagnosis.attractors import Attractors, Mapper
 from chaosgym.diagnosis.periodic_orbit import PRECISE
 from chaosgym.errors import SimulationError
 from chaosgym.machines import Machine
-from chaosgym.machines.binned.machine import BinnedMachine
 from chaosgym.machines.parameters import parameters_of
 
 PHASES = 8
@@ -87,7 +86,7 @@ def smallest_shock(machine: Machine, found: Attractors, *, knocks: int = 384, wo
     >>> smallest_shock(beam, attractors(beam), knocks=32).knock is None
     True
     """
-    rows = _unit_knocks(machine)
+    rows = machine.unit_knocks
     phases = [k / PHASES for k in range(PHASES)] if machine.section_at(0.0) is not None else [0.0]
     ways = [(joint, phase, sign) for joint in range(len(rows)) for phase in phases for sign in (1.0, -1.0)]
     sizes = np.geomspace(SMALLEST, 1.0, max(2, knocks // len(ways)))
@@ -134,17 +133,6 @@ def knock_words(machine: Machine, knock: Knock) -> str:
 
 def _name(machine: Machine, joint: int) -> str:
     return machine.joints[joint] if machine.joints else ""
-
-
-def _unit_knocks(machine: Machine) -> list[Array]:
-    """Change of the velocities (n,) that changes that of each joint by 1, by an impulse along the joint's motion."""
-    flexible = machine.without_friction
-    if flexible is not None:
-        return [row / float(row @ row) for row in flexible.joints]
-    if isinstance(machine, BinnedMachine):
-        impulse = machine.held().inverse_mass[0] @ machine.display
-        return [impulse / float(machine.display @ impulse)]
-    return []
 
 
 def _knocked(machine: Machine, found: Attractors, rows: Sequence[Array], knock: Knock) -> Array | None:

@@ -13,7 +13,6 @@ import numpy as np
 from chaosgym.arrays import Array
 from chaosgym.machines import Machine
 from chaosgym.machines.abilities import Flexible
-from chaosgym.machines.binned.machine import BinnedMachine
 from chaosgym.simulation import CycleRecord
 
 LEAST_REACH, LARGEST_REACH = 3.0, 10.0
@@ -84,18 +83,7 @@ def start_box(machine: Machine, record: CycleRecord) -> StartBox:
 
 def _to_stops(machine: Machine, swing: Array) -> list[Array]:
     """Displacements (n,) that bring each joint to its farthest stop with the least energy."""
-    if isinstance(machine, BinnedMachine):
-        rows = [(row, contact.gap) for contact in machine.contacts for row in contact.row]
-    else:
-        flexible = machine.without_friction
-        if flexible is None:
-            return []
-        rooms = [machine.room_of(joint) for joint in range(len(flexible.joints))]
-        rows = [
-            (row, max((abs(stop) for stop in room if math.isfinite(stop)), default=0.0))
-            for row, room in zip(flexible.joints, rooms, strict=True)
-        ]
-    shapes = [(np.abs(row) / swing**2, float(np.sum((row / swing) ** 2)), gap) for row, gap in rows]
+    shapes = [(np.abs(row) / swing**2, float(np.sum((row / swing) ** 2)), gap) for row, gap in machine.stop_rows]
     return [gap * shape / compliance for shape, compliance, gap in shapes if compliance > 0.0]
 
 

@@ -311,6 +311,22 @@ class Machine(Abilities, ABC):
         gap = float(getattr(self, self.clearance_field))
         return -gap, gap
 
+    @property
+    def stop_rows(self) -> list[tuple[Array, float]]:
+        """Displacement (n,) of each contact per unit coordinate, and the distance [m] to its farthest stop."""
+        equations = self.without_friction
+        if equations is None:
+            return []
+        rooms = [self.room_of(joint) for joint in range(len(equations.joints))]
+        farthest = [max((abs(stop) for stop in room if math.isfinite(stop)), default=0.0) for room in rooms]
+        return list(zip(equations.joints, farthest, strict=True))
+
+    @property
+    def unit_knocks(self) -> list[Array]:
+        """Change of the velocities (n,) that changes that of each joint by 1, by an impulse along its motion."""
+        equations = self.without_friction
+        return [] if equations is None else [row / float(row @ row) for row in equations.joints]
+
     def sensed(self, peak_force: Array) -> Array:
         """Peak forces [N] that the sensor of the monitored joint shows, (..., cycles), of those of all ``sides``."""
         return np.asarray(peak_force[..., 0])

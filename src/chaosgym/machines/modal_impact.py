@@ -20,7 +20,6 @@ from chaosgym.machines.abilities import Flexible
 from chaosgym.machines.flexible_model import with_tables
 from chaosgym.machines.integrators import ExactEvents, Integrator
 from chaosgym.machines.machine import Machine
-from chaosgym.machines.model_line import interpolated
 from chaosgym.machines.parameters import check_parameter
 
 if TYPE_CHECKING:
@@ -67,6 +66,8 @@ class ModalImpactMachine(Machine):
         exact: Callable[[float], Any] = super().along(field, low, high)
         if exact(low).structure is exact(high).structure:
             return lambda value: self._with_unchecked(**{field: check_parameter(self, field, value)})
+        from chaosgym.machines.model_line import interpolated
+
         models = cache(lambda: interpolated(lambda value: exact(value).structure, low, high))
 
         def at(value: float) -> Any:

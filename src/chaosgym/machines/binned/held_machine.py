@@ -76,6 +76,17 @@ class HeldMachine(Machine):
         return np.array([contact.gap for contact in self.contacts])
 
     @property
+    def stop_rows(self) -> list[tuple[Array, float]]:
+        """Displacement (n,) of each contact per unit coordinate, and its gap [m]."""
+        return [(row, contact.gap) for contact in self.contacts for row in contact.row]
+
+    @property
+    def unit_knocks(self) -> list[Array]:
+        """Change of the velocities (n,) that changes that of the monitored joint by 1, by an impulse at angle 0."""
+        impulse = self.held().inverse_mass[0] @ self.display
+        return [impulse / float(self.display @ impulse)]
+
+    @property
     def radix(self) -> int:
         """Contact states of a channel that differ in their matrices: 3 where friction tells one side from the other."""
         return 2
