@@ -39,7 +39,7 @@ def ended(command, **options):
     words = [sys.executable, *program, *shlex.split(command)]
     done = subprocess.run(words, stdin=subprocess.DEVNULL, stderr=subprocess.PIPE, text=True, check=False, **options)
     lines = done.stderr.replace("\r", "\n").splitlines()
-    progress = re.compile(r"\s*|.*\|.*|.*: \d+ s|./4 .*")
+    progress = re.compile(r"\s*|.*\|.*|.*: \d+ s|./4 .*| +picture: .*")
     return done.returncode, [line for line in lines if not progress.fullmatch(line)]
 
 
