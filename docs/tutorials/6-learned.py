@@ -43,7 +43,7 @@ grid, demand, speed = policy.task.grid, job.demand[:, 0], job.speed[:, 0]
 mean, scatter = job.column("mean_peak_force")[:, 0], job.column("std_peak_force")[:, 0]
 for who, one in (("agent", job), ("following the demand", usual)):
     told = f"return {one.returns[0]:6.1f}, irregular {one.type_iii_share[0]:4.1%}, {one.deviation[0]:.2f} Hz off"
-    print(f"{who:21} {told}, life {one.life[0]:.3f} h")
+    print(f"{who:21} {told}, damage {one.damage[0]:.3f}")
 
 # %% [markdown]
 # ## What it expected
