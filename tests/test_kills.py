@@ -142,7 +142,9 @@ def _design(out):
 
 
 def _report(out):
-    return json.loads((out / "report.json").read_text()), (out / "report.html").read_text().replace(str(out), "OUT")
+    """JSON and page, which name the file of the brief."""
+    answer, page = ((out / name).read_text().replace(str(out), "OUT") for name in ("report.json", "report.html"))
+    return json.loads(answer), page
 
 
 def _minari(out):
