@@ -106,15 +106,21 @@ def rest_state(machine: Machine) -> MotionState:
 
 
 def begin_state(machine: Machine) -> MotionState:
-    """Return the state from which a machine runs where no other is given: its own, or rest."""
-    rest = rest_state(machine)
-    return rest._replace(coordinates=np.array(machine.initial_state)) if machine.initial_state else rest
+    """Return the state from which a machine runs where no other is given: its own, or rest.
+
+    Raises
+    ------
+    ParameterError
+        If its own has another length than its states.
+    """
+    return _initial(machine, None)
 
 
 def _initial(machine: Machine, given: MotionState | ArrayLike | None) -> MotionState:
-    rest = begin_state(machine)
-    if given is None:
-        given = rest
+    rest = rest_state(machine)
+    if given is None and not machine.initial_state:
+        return rest
+    given = machine.initial_state if given is None else given
     state = given if isinstance(given, MotionState) else MotionState(np.array(given, dtype=float), rest.bouncing)
     if state.coordinates.shape != rest.coordinates.shape or not np.all(np.isfinite(state.coordinates)):
         raise ParameterError(
