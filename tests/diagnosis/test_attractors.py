@@ -152,7 +152,11 @@ def test_the_two_motions_of_a_gear_pair_are_found():
 
 
 def test_neutral_motions_are_one_family(tmp_path):
-    """Pressed together and held by friction, a machine rests wherever it stops: one family, not 48 motions."""
+    """Pressed together and held by friction, a machine rests wherever it stops: one family, not 48 motions.
+
+    Its multiplier is 1, and a rounding of the model decides whether a start on it is proven to stay. One that is not is
+    told as unsettled, and never as a motion of its own.
+    """
     file = tmp_path / "held.toml"
     file.write_text(
         '[structure]\nfrequencies = "5, 20 Hz"\ndamping_ratios = 0.02\nmodal_masses = "1, 1 kg"\n'
@@ -165,7 +169,8 @@ def test_neutral_motions_are_one_family(tmp_path):
     found = attractors(chaosgym.read_machine(file))
     (held,) = found.motions
     assert held.neutral
-    assert held.random_starts == 48
+    assert held.random_starts >= 1
+    assert held.random_starts + found.unsettled == 48
     assert "neutral" in held.words
 
 
