@@ -129,6 +129,11 @@ LEARNED = [f"src/chaosgym/weights/{machine}.npz" for machine in DATASETS]
 LEARNED += [f"{SHIPPED}/{name}/weights.npz" for name in POLICIES]
 """What answers and plays in commands and tutorials."""
 
+PLAYED = [
+    f"src/chaosgym/control/controllers/{name}.py" for name in ("controller", "feedback", "kriging", "planned", "table")
+]
+"""Files of the contenders of the shipped comparisons; another contender's is none of them until it has played."""
+
 LADDER_OPTIONS = {
     "impact-beam": "--points 60 --cycles 200 --transient 100 --budget 4 --workers 1",
     "slider-crank": "--points 60 --cycles 50 --transient 30 --budget 4 --workers 1",
@@ -202,6 +207,14 @@ def task_policy():
         yield task(name, TASKS, made, *before, full, *copies)
 
 
+def task_sense():
+    """The sense of irregular motion behind ``classifier="on"``; the command goes on where it was stopped."""
+    run, made = f"{RUNS}/sense", "src/chaosgym/weights/impact-beam-sense.npz"
+    used = [*TASKS, "agents/learn_sense.py", "src/chaosgym/envs/classified.py", "src/chaosgym/envs/sense.py"]
+    train = f"python agents/learn_sense.py {FLEET} --seed 0 --out {run}"
+    yield task("impact-beam", used, [made], train, f"cp {run}/sense.npz {made}")
+
+
 def task_pool():
     """Machines of chaosgym/AnyMachine-v0, drawn and filtered."""
     used = ["src/chaosgym/machines/family.py", "src/chaosgym/envs/pool.py", "benchmarks/envs/pool.py"]
@@ -212,7 +225,7 @@ def task_scores():
     """Jobs of controllers and policies on the machines kept for evaluation."""
     for name, options in SCORES.items():
         made, run = f"src/chaosgym/control/results/{name}.parquet", f"{RUNS}/{name}.parquet"
-        used = TASKS + sources("src/chaosgym/control/controllers")
+        used = TASKS + PLAYED
         if name in POLICIES:
             used.append(f"{SHIPPED}/{name}/weights.npz")
             kind = "map" if "learn_map" in POLICIES[name][-1] else "ppo"
@@ -224,7 +237,7 @@ def task_scores():
 def task_jobs():
     """Jobs of the fleet's beams in Exudyn; the same command without ``rm`` goes on with a file of fewer."""
     made = "docs/data/other-simulator.jsonl"
-    used = TASKS + sources("src/chaosgym/control/controllers") + [f"{SHIPPED}/ImpactBeamTolerance-v1-fleet/weights.npz"]
+    used = TASKS + PLAYED + [f"{SHIPPED}/ImpactBeamTolerance-v1-fleet/weights.npz"]
     used += ["benchmarks/envs/other_simulator.py", "src/chaosgym/envs/exudyn_beam.py"]
     yield task("other-simulator", used, [made], f"rm -f {made}", "python -m benchmarks other-simulator")
 
@@ -233,11 +246,14 @@ def task_page():
     """Pages of the documentation that a command writes."""
     pages = [str(path) for path in Path("docs/environments").glob("*.md")]
     made = "python -m benchmarks.envs.documentation docs"
-    yield task("environments", TASKS + sources("src/chaosgym/envs"), pages, made)
+    texts = ["benchmarks/envs/documentation.py", "benchmarks/envs/page.md", "benchmarks/envs/task.md"]
+    yield task("environments", TASKS + sources("src/chaosgym/envs") + texts, pages, made)
     statements = [str(path) for path in Path("thesis/statements").iterdir() if path.suffix in (".csv", ".toml")]
     statements.append("thesis/scorecard/firmness.json")
     write = "python -m thesis scorecard --markdown > docs/development/scorecard.md"
     yield task("scorecard", [*statements, *sources("thesis/scorecard")], ["docs/development/scorecard.md"], write)
+    write = "python -m thesis numerics --markdown > docs/development/numerics.md"
+    yield task("numerics", [*statements, *sources("thesis/scorecard")], ["docs/development/numerics.md"], write)
     options = f"--gallery docs/development/figures.md --overwrite --results {RUNS}/figures"
     draw = f"python -m thesis figures all --out docs/development/figures {options}"
     examples = "benchmarks/documentation/examples.toml"
@@ -260,8 +276,9 @@ def task_picture():
     yield task("rattle", [rattle], ["docs/rattle.gif"], "python -m benchmarks.documentation.rattle docs/rattle.gif")
     used = ["thesis/figures/type_two.py", "thesis/scorecard/candidates.json"]
     yield task("type-two", used, ["docs/type-two.png"], "python -m thesis.figures.type_two docs/type-two.png")
-    play = "chaosgym run-agent chaosgym/ImpactBeamTolerance-v1 --machine 13 --out docs/agent.gif"
-    yield task("agent", [*TASKS, *LEARNED], ["docs/agent.gif"], play)
+    for name, machine in (("agent", "ImpactBeam"), ("crank", "SliderCrank")):
+        play = f"chaosgym run-agent chaosgym/{machine}Tolerance-v1 --machine 13 --out docs/{name}.gif"
+        yield task(name, [*TASKS, *LEARNED], [f"docs/{name}.gif"], play)
     curves, drawn = "docs/data/training.csv", "docs/training.png"
     draw = f"python -m benchmarks curves --table {curves} --figure {drawn}"
     yield task("training", [curves, "benchmarks/envs/curves.py"], [drawn], draw)
@@ -288,7 +305,7 @@ def task_sample():
     used = ["benchmarks/documentation/sample_recordings.py", "docs/machines/shaw-holmes-1983.toml"]
     yield task("decided", used, decided, "python -m benchmarks.documentation.sample_recordings docs/data")
     made = "docs/data/peaks.csv"
-    run = f"chaosgym simulate impact-beam {point} --out {made}"
+    run = f"chaosgym simulate impact-beam {point} --fidelity standard --out {made}"
     yield task("peaks", [], [made], f"rm -f {made}", run)
 
 

@@ -24,9 +24,10 @@ from chaosgym.series.exponent import average_growth, exponent_from_series
 from chaosgym.series.spectrum import power_spectrum
 from chaosgym.series.stroboscopic import find_recurrence, scales, subtract_bands
 from chaosgym.series.two_step import BROAD_FLOOR, two_step_test
-from chaosgym.series.verdict import Diagnosis, Nature
+from chaosgym.series.verdict import Nature
 from chaosgym.series.zero_one import zero_one_statistic
-from chaosgym.simulation import CycleRecord, parallel_map
+from chaosgym.simulation import CycleRecord
+from chaosgym.simulation.parallel import parallel_map
 
 REFERENCE_CYCLES = 10_000
 """Cycles of the reference run."""
@@ -144,8 +145,7 @@ def _recurrence(record: CycleRecord, growth: Array) -> Nature:
 
 
 def _two_step(record: CycleRecord, growth: Array) -> Nature:
-    verdict = two_step_test(record)
-    return "periodic" if verdict.transient else verdict.nature
+    return two_step_test(record).nature
 
 
 def _exponent_sign(record: CycleRecord, growth: Array) -> Nature:
@@ -300,12 +300,8 @@ def _judge(machine: Machine, tests: Sequence[RecordTest], reference_cycles: int,
     verdict = diagnose(machine, budget=budget)
     seconds.append(thread_time() - began)
     cycles.append(float(verdict.evidence["cycles_used"]))
-    votes.append(_eventual(verdict))
+    votes.append(verdict.nature)
     return _Point(reference_nature(record, growth), tuple(votes), tuple(cycles), tuple(seconds))
-
-
-def _eventual(verdict: Diagnosis) -> Nature:
-    return "periodic" if verdict.transient else verdict.nature
 
 
 def _row(name: str, index: int, points: Sequence[_Point]) -> AgreementRow:

@@ -67,15 +67,19 @@ def test_scorecard_page_shows_what_the_machines_do():
 
 
 def test_hits_are_those_of_the_rows():
-    """Totals of the page count its rows, and the README repeats them."""
+    """Totals of the page count its rows, and the README repeats the firm ones."""
     page, readme = (DOCS / "development" / "scorecard.md").read_text(), (DOCS.parent / "README.md").read_text()
     told = []
     for name, letters in (("impact-beam", "IBS"), ("slider-crank", "SSC")):
         verdicts = re.findall(rf"^\| {letters}-\d+ \|(?:[^|]*\|){{4}} (\S+) \| (?:-|\d+%) \|", page, re.MULTILINE)
         hits, counted = verdicts.count("hit"), len(verdicts) - verdicts.count("contradictory")
-        assert f"## {name}\n\nHits: {hits} of {counted} (" in page
-        told.append(f"{hits} of {counted}")
-    assert f"hit by the fitted beam and crank: **{told[0]}, {told[1]}**" in readme
+        section = page.split(f"## {name}\n", 1)[1].split("\n## ", 1)[0]
+        assert f"The machine itself hits {hits} of {counted}." in section
+        shares = [float(share) for share in re.findall(r"\| (\d+)% \|", section)]
+        firm = f"{sum(share >= 50 for share in shares)} of {len(shares)}"
+        assert section.startswith(f"\nFirm hits: {firm}.")
+        told.append(firm)
+    assert f"[firmly](docs/development/scorecard.md) hit by beam and crank: **{told[0]}, {told[1]}**" in readme
 
 
 def test_files_named_in_the_documentation_exist():

@@ -17,11 +17,11 @@ from chaosgym.files import (
     held,
     is_empty,
     made_whole,
-    parquet_of,
     toml_of,
     unpacked,
     write_atomically,
 )
+from chaosgym.parquet import parquet_of
 
 HOLD = """
 import sys, time
@@ -238,8 +238,25 @@ def test_a_table_that_claims_many_cells_is_refused(tmp_path):
     with pytest.raises(ValueError, match=r"be read as Parquet: ."):
         parquet_of(tmp_path / "b.parquet")
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr("chaosgym.files.MOST_CELLS", 999)
+        patch.setattr("chaosgym.parquet.MOST_CELLS", 1000)
+        assert parquet_of(tmp_path / "a.parquet").num_rows == 1000
+        patch.setattr("chaosgym.parquet.MOST_CELLS", 999)
         with pytest.raises(ValueError, match="it claims 1000 cells; allowed: up to 999"):
+            parquet_of(tmp_path / "a.parquet")
+
+
+@pytest.mark.parametrize("kind", ["text", "list of texts"])
+def test_a_text_that_is_repeated_counts_as_often(tmp_path, kind):
+    """A file of 1 kB that refers to 8 kB a thousand times claims a million cells, and is read where so many may be."""
+    import pyarrow as pa
+    import pyarrow.parquet as pq
+
+    column = pa.array(1000 * ["x" * 8000] if kind == "text" else 500 * [2 * ["x" * 8000]])
+    pq.write_table(pa.table({"a": column}), tmp_path / "a.parquet", store_schema=False)
+    assert parquet_of(tmp_path / "a.parquet").column("a").to_pylist() == column.to_pylist()
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr("chaosgym.parquet.MOST_CELLS", 999_999)
+        with pytest.raises(ValueError, match="it claims 1000000 cells; allowed: up to 999999"):
             parquet_of(tmp_path / "a.parquet")
 
 

@@ -9,6 +9,7 @@ import zipfile
 from pathlib import Path
 
 import numpy as np
+import pyarrow as pa
 import pyarrow.parquet as pq
 import pytest
 from hypothesis import HealthCheck, given, settings
@@ -23,6 +24,7 @@ from chaosgym.design.brief import template as brief_template
 from chaosgym.errors import ChaosgymError
 from chaosgym.machines.machine_file import machine_class, template
 from chaosgym.machines.modal_machine.archives import read_archive, read_matrix
+from chaosgym.parquet import parquet_of
 from chaosgym.recordings.read import read_recording
 from chaosgym.sweeps import read_sweep
 from chaosgym.sweeps.info import dataset_info
@@ -252,3 +254,17 @@ def test_two_thousand_damaged_inputs(kind, tmp_path, monkeypatch):
     """As the test above."""
     monkeypatch.setenv("XDG_STATE_HOME", str(tmp_path / "state"))
     _fuzz(kind, tmp_path, 2000)
+
+
+def test_a_damaged_footer_does_not_end_the_process():
+    """Levels of a column that count one too many: Parquet's reader throws where no exception may pass."""
+    content = _saved(lambda buffer: pq.write_table(pa.table({"force": [[1.0], [], None]}), buffer))
+    said = set()
+    for place in range(len(content) - pq.read_metadata(io.BytesIO(content)).serialized_size - 8, len(content)):
+        for value in (0x19, 0x26, 0x36, 0x46):
+            damaged = content[:place] + bytes([value]) + content[place + 1 :]
+            try:
+                parquet_of(io.BytesIO(damaged))
+            except ValueError as error:
+                said.add(str(error))
+    assert any("histogram size mismatch" in message for message in said)

@@ -44,7 +44,7 @@ def test_the_page_runs(tmp_path, monkeypatch, capsys):
         if kind == "python":
             exec(compile(text, "own-machine.md", "exec"), names)
         elif kind == "toml":
-            marks = {"arcmin": "servo", "[[joint]]": "arm2", "tangent": "blade"}
+            marks = {"motor - 3 wheel": "gears", "arcmin": "servo", "[[joint]]": "arm2", "tangent": "blade"}
             name = next((name for mark, name in marks.items() if mark in text), "arm")
             Path(f"{name}.toml").write_text(text)
         else:

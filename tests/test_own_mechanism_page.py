@@ -17,9 +17,13 @@ def test_the_page_runs(tmp_path, monkeypatch):
     """Its Python and its commands run in the order in which they stand, and leave picture and report."""
     monkeypatch.chdir(tmp_path)
     names = {}
-    for kind, text in re.findall(r"```(python|console)\n(.*?)```", PAGE, re.DOTALL):
+    for before, kind, text in re.findall(r"(.*?)```(python|toml|console)\n(.*?)```", PAGE, re.DOTALL):
         if kind == "python":
             exec(compile(text, "own-mechanism.md", "exec"), names)
+            continue
+        if kind == "toml":
+            named = re.search(r"\(`(\w+\.toml)`\):\s*$", before)
+            Path(named[1] if named else "press.toml").write_text(text, encoding="utf-8")
             continue
         for line in text.strip().splitlines():
             command, _, target = line.partition(" > ")

@@ -2,9 +2,12 @@
 
 import ast
 import json
+import os
 import re
 import subprocess
 import sys
+import tarfile
+import tomllib
 import venv
 import zipfile
 from pathlib import Path
@@ -28,11 +31,12 @@ def test_import_is_light():
 
 def test_simulating_imports_few_modules():
     """The simplest command loads what it needs: not the other machine, nor diagnosis, sweeps, learning or plotting."""
-    own = [name for name in _modules_of("simulate", "impact-beam") if name.partition(".")[0] == "chaosgym"]
+    loaded = _modules_of("simulate", "impact-beam")
+    own = [name for name in loaded if name.partition(".")[0] == "chaosgym"]
     wings = ("series", "recordings", "diagnosis", "branches", "sweeps", "classifier", "envs", "plotting")
     assert not [name for name in own if name.split(".")[1:2] and name.split(".")[1] in wings]
     assert "chaosgym.machines.slider_crank" not in own
-    assert len(own) <= 46
+    assert len(own) <= 54
 
 
 def _modules_of(*arguments):
@@ -46,11 +50,11 @@ def _modules_of(*arguments):
 
 
 def test_judging_a_recording_loads_no_machine_and_no_compiler():
-    """What reads and judges a CSV, and no more: 40 modules of chaosgym at the most."""
+    """What reads and judges a CSV, and no more: 46 modules of chaosgym at the most."""
     loaded = _modules_of("judge", str(ROOT / "docs/data/peaks.csv"), "--column", "upper")
     own = [name for name in loaded if name.partition(".")[0] == "chaosgym"]
     assert "chaosgym.recordings.judge" in own
-    assert len(own) <= 40
+    assert len(own) <= 46
     assert {"numba", "gymnasium", "matplotlib", "chaosgym.core", "chaosgym.machines"}.isdisjoint(loaded)
 
 
@@ -162,9 +166,9 @@ def test_every_kernel_takes_its_decorator_from_one_place():
     assert guilty == []
 
 
-@pytest.mark.parametrize("words", ["info", "show impact-beam", "show slider-crank", "--help"])
+@pytest.mark.parametrize("words", ["info", "--help", "show --help"])
 def test_commands_without_kernels_do_not_import_numba(words):
-    """What runs no machine does not wait for the compiler."""
+    """What computes no machine does not wait for the compiler."""
     program = "import sys; from chaosgym.cli import app; app(sys.argv[1:], standalone_mode=False)"
     told = [sys.executable, "-c", f"import atexit, sys; atexit.register(lambda: print(*sys.modules)); {program}"]
     found = subprocess.run([*told, *words.split()], check=True, capture_output=True, text=True).stdout
@@ -192,6 +196,15 @@ def test_editing_a_kernel_source_changes_the_digest(tmp_path):
     assert source_digest(tmp_path) != before
 
 
+def _collect_from(source, folder):
+    """Every test file of the source archive finds what it imports there, as a packager's build does."""
+    with tarfile.open(source) as archive:
+        archive.extractall(folder / "unpacked", filter="data")
+    (root,) = (folder / "unpacked").iterdir()
+    collect = [sys.executable, "-m", "pytest", "--collect-only", "-q", "-p", "no:cacheprovider", "-m", ""]
+    subprocess.run(collect, cwd=root, env={**os.environ, "PYTHONPATH": str(root / "src")}, check=True)
+
+
 @pytest.mark.slow
 def test_the_wheel_alone_classifies_simulates_and_plays(folder, tmp_path, monkeypatch):
     """Wheel and source pass ``twine check``; in a fresh environment, without torch, the wheel's commands work.
@@ -202,10 +215,14 @@ def test_the_wheel_alone_classifies_simulates_and_plays(folder, tmp_path, monkey
     subprocess.run([sys.executable, "-m", "build", "--outdir", str(tmp_path), str(ROOT)], check=True)
     (wheel,), (source,) = tmp_path.glob("chaosgym-*.whl"), tmp_path.glob("chaosgym-*.tar.gz")
     subprocess.run([sys.executable, "-m", "twine", "check", "--strict", str(wheel), str(source)], check=True)
+    _collect_from(source, tmp_path)
     names = zipfile.ZipFile(wheel).namelist()
     assert "chaosgym/py.typed" in names
-    assert {"chaosgym/weights/impact-beam.npz", "chaosgym/weights/slider-crank.npz"} <= set(names)
+    weights = ("impact-beam", "slider-crank", "impact-beam-sense")
+    assert {f"chaosgym/weights/{name}.npz" for name in weights} <= set(names)
     assert not [name for name in names if name.startswith(("tests", "agents"))]
+    assert "chaosgym/compiled/made-for.txt" in names
+    assert "none-any" not in wheel.name
     venv.create(tmp_path / "env", with_pip=True)
     tools = tmp_path / "env" / "bin"
     subprocess.run([tools / "pip", "install", "--quiet", str(wheel)], check=True)
@@ -214,7 +231,10 @@ def test_the_wheel_alone_classifies_simulates_and_plays(folder, tmp_path, monkey
 
     def told(*words):
         command = [str(tools / "chaosgym"), *map(str, words), "--json"]
-        return json.loads(subprocess.run(command, capture_output=True, text=True, check=True, cwd=tmp_path).stdout)
+        environment = {**os.environ, "NUMBA_CACHE_DIR": str(tmp_path / "cache")}
+        done = subprocess.run(command, capture_output=True, text=True, check=True, cwd=tmp_path, env=environment)
+        assert "compiling" not in done.stderr, "machine code comes with the wheel"
+        return json.loads(done.stdout)
 
     beam = ("impact-beam", "--frequency-hz", "30", "--clearance-mm", "0.127")
     assert told("classify", *beam)["response_type"]
@@ -235,3 +255,28 @@ def test_version_is_said_once():
         line for line in (ROOT / "CHANGELOG.md").read_text(encoding="utf-8").splitlines() if line[:3] == "## "
     )
     assert latest.split()[1] in (chaosgym.__version__, "Unreleased")
+
+
+def test_the_conda_recipe_has_the_packages_dependencies():
+    """The recipe's requirements, hash apart, are those of ``pyproject.toml``, and its version is the package's."""
+    import chaosgym
+
+    recipe = (ROOT / ".ci/conda/meta.yaml").read_text(encoding="utf-8")
+    assert f'{{% set version = "{chaosgym.__version__}" %}}' in recipe
+    project = tomllib.loads((ROOT / "pyproject.toml").read_text(encoding="utf-8"))["project"]
+    wanted = {re.sub(r"^matplotlib(?=\W)", "matplotlib-base", one) for one in project["dependencies"]}
+    section = recipe.partition("  run:\n")[2].partition("\n\n")[0]
+    stated = {line.strip(" -").replace(" ", "") for line in section.splitlines()}
+    assert stated == wanted | {f"python{project['requires-python']}"}
+    assert "noarch: python" in recipe
+    assert "CHAOSGYM_KERNELS=none" in recipe, "machine code is for one platform"
+
+
+def test_a_release_uploads_no_wheel_that_an_index_refuses():
+    """An index takes no wheel of plain Linux; who has another platform needs the one without machine code."""
+    path = ROOT / ".github/workflows/release.yml"
+    if not (ROOT / ".github").is_dir():
+        pytest.skip("the source archive holds no workflows")
+    steps = path.read_text(encoding="utf-8")
+    assert "--remove --platform-tag manylinux" in steps
+    assert "CHAOSGYM_KERNELS=none python -m build --wheel" in steps

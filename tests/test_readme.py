@@ -51,9 +51,9 @@ def sentences(markdown):
 
 
 def test_the_readme_is_short():
-    """At most 700 words and two pictures; sentences of at most 30 words, half of them of at most 15."""
+    """At most 600 words and two pictures; sentences of at most 30 words, half of them of at most 15."""
     lengths = sorted(len(sentence.split()) for sentence in sentences(README))
-    assert len(README.split()) <= 700
+    assert len(README.split()) <= 600
     assert README.count("![") == 2
     assert lengths[-1] <= 30
     assert lengths[len(lengths) // 2] <= 15

@@ -9,7 +9,7 @@ from benchmarks.documentation.sample_recordings import recordings
 from chaosgym import judge_peaks, read_recording
 
 DATA = Path(__file__).parents[1] / "docs" / "data"
-NATURES = {"periodic": "periodic, period 1", "chaotic": "chaotic"}
+NATURES = {"periodic": "periodic, period 1", "chaotic": "chaotic for at least 2000 cycles"}
 
 
 @pytest.mark.parametrize("nature", NATURES)

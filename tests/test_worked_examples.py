@@ -25,7 +25,7 @@ def test_every_example_is_on_the_page():
         assert f"(examples/{name}.toml)" in PAGE
         assert f"(machines/{Path(brief.machine.name).name})" in PAGE
         assert (DOCS / "examples" / f"{name}.png").stat().st_size > 10_000
-        assert f"of {brief.series_size} machines in the tolerances" in shown(name, PAGE)
+        assert f"{brief.series_size} machines within the tolerances, each run from rest" in shown(name, PAGE)
         assert f"report: {name}.html" in shown(name, PAGE)
 
 

@@ -21,7 +21,10 @@ LIBRARY = Path(chaosgym.__file__).parent
 HERE = Path(__file__).parent
 
 DECISIVE_SOURCES = (
-    *(LIBRARY / name for name in ("core", "machines", "simulation", "diagnosis", "design/peak_impacts.py")),
+    *(
+        LIBRARY / name
+        for name in ("core", "machines", "simulation", "series", "diagnosis", "branches", "design/peak_impacts.py")
+    ),
     *(HERE / "scorecard" / f"{name}.py" for name in ("observation", "beam_runs", "crank_runs")),
     *(HERE / "figures" / f"{name}.py" for name in ("computations", "scored")),
 )

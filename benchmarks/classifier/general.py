@@ -21,7 +21,8 @@ def general(machines: Sequence[Machine], *, progress: bool = False) -> dict[str,
         ("proven", "proven wrong", "chaos dies out", "learned", "learned wrong", "not answered", "undetermined"), 0
     )
     for machine in tqdm(machines, desc="classify", unit="point", disable=not progress):
-        answer, truth = classifier.classify(machine, types=False).centre, diagnose(machine)
+        answer = classifier.classify(machine, types=False).centre
+        truth = diagnose(machine).labelled("thesis")
         if truth.nature == "undetermined":
             counts["undetermined"] += 1
         elif answer.proven and truth.status == "transient":

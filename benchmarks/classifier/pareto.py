@@ -22,6 +22,7 @@ from chaosgym.machines import Machine
 from chaosgym.simulation import simulate
 from chaosgym.sweeps import Axis, SweepPlan
 from chaosgym.sweeps.label import label_point
+from chaosgym.sweeps.plan import UNSTATED
 
 MILLION = 1e6
 
@@ -44,12 +45,13 @@ def fresh_machines(classifier: MachineClassifier, crosses: int, seed: int, *, pr
     machines = [
         plan.machine_at({name: float(column[row]) for name, column in columns.items()}) for row in range(len(plan))
     ]
+    definition = data.get("definition", UNSTATED)
     label_point(machines[0], plan.budget)
     labels, seconds = [], []
     for machine in tqdm(machines, desc="diagnose", unit="machine", disable=not progress):
         machine.reduce()
         began = thread_time()
-        labels.append(label_point(machine, plan.budget))
+        labels.append(label_point(machine, plan.budget, definition=definition))
         seconds.append(thread_time() - began)
     natures = np.array([str(label.get("nature")) for label in labels])
     peaks = np.array([float(label.get("largest_peak", np.nan)) for label in labels])

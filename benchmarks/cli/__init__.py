@@ -8,8 +8,9 @@ import click
 from benchmarks.cli.bench import bench
 from benchmarks.cli.datasets import build_dataset
 from benchmarks.cli.environments import COMMANDS
-from benchmarks.cli.fidelity import stability
+from benchmarks.cli.fidelity import accuracy, ladder, stability
 from benchmarks.cli.house import house
+from benchmarks.cli.mutants import mutants
 from chaosgym.cli import run_command
 from chaosgym.cli.machine_options import machine_command
 from chaosgym.cli.output import AS_JSON, emit
@@ -202,7 +203,10 @@ for command in (
     monitors,
     general,
     exponents,
+    accuracy,
+    ladder,
     stability,
+    mutants,
 ):
     app.add_command(command)
 for command in COMMANDS:

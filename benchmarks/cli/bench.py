@@ -121,14 +121,16 @@ def _rates(result: dict[str, Any]) -> list[str]:
     load = result["load_average"]
     lines = [f"{'':64s}{'per second':>12s}{'per CPU second':>16s}"]
     for quantity, figures in result.items():
-        if quantity in ("load_average", "step_microseconds"):
+        if quantity in ("load_average", "step_microseconds", "in_loops"):
             continue
         lines.append(quantity.replace("_", " "))
         for name, rates in figures.items():
             lines.append(f"  {name:62s}{_shown(rates['per_second']):>12s}{_shown(rates['per_processor_second']):>16s}")
-    lines.append(f"{'us of processor time':64s}{'a step':>12s}{'Python of it':>16s}")
+    lines.append(f"{'us of processor time':64s}{'a step':>12s}{'Python of it':>16s}{'in warm caches':>16s}")
     for name, cost in result["step_microseconds"].items():
-        lines.append(f"  {name:62s}{cost['step']:12.1f}{cost['python']:16.1f}")
+        lines.append(f"  {name:62s}{cost['step']:12.1f}{cost['python']:16.1f}{cost['warm']:16.1f}")
+    lines.append("in reference loops: 1,000 steps of 64 logistic maps compiled, or of one in Python")
+    lines += [f"  {name:74s}{loops:16.1f}" for name, loops in result["in_loops"].items()]
     return [*lines, f"load average of this computer: {load['before']:.1f} before, {load['after']:.1f} after"]
 
 

@@ -23,6 +23,31 @@ def judges(env: str, machines: int, speeds: int, as_json: bool) -> None:
 
 
 @click.command()
+@click.option("--machines", type=click.IntRange(8, 10_000), default=1024, show_default=True, help="That are fitted.")
+@click.option("--others", type=click.IntRange(8, 10_000), default=256, show_default=True, help="That are scored.")
+@click.option("--speeds", type=click.IntRange(1, 100), default=8, show_default=True, help="That each of them holds.")
+@click.option("--sense", "chosen", multiple=True, help="Name of a sense; all by default; may be repeated.")
+@click.option(
+    "--kept",
+    type=click.Path(dir_okay=False, path_type=Path),
+    default="docs/data/sense.json",
+    show_default=True,
+    help="Rows that are done: they are not made again.",
+)
+@AS_JSON
+def sense(machines: int, others: int, speeds: int, chosen: tuple[str, ...], kept: Path, as_json: bool) -> None:
+    """Tell how well readings tell irregular motion, by what judges them, cycles looked and error of the sensors."""
+    from benchmarks.envs.sense import SENSES, lines
+    from benchmarks.envs.sense import sense as run
+
+    for name in chosen:
+        if name not in SENSES:
+            raise click.UsageError(f"--sense {name}: allowed: {'; '.join(SENSES)}")
+    found = run(machines, others, speeds, chosen or SENSES, kept)
+    emit({"rows": found}, as_json, lambda: lines(found))
+
+
+@click.command()
 @click.option("--machines", type=click.IntRange(2, 10_000), default=64, show_default=True)
 @click.option("--fleets", is_flag=True, help="Fleets of beams and cranks instead of beams with one thing changed.")
 @click.option("--row", "chosen", multiple=True, help="Name of a row; all by default; may be repeated.")
@@ -44,6 +69,33 @@ def mismatch(machines: int, fleets: bool, chosen: tuple[str, ...], kept: Path, a
         if name not in rows:
             raise click.UsageError(f"--row {name}: allowed: {'; '.join(rows)}")
     found = run(machines, chosen or rows, kept)
+    emit({"rows": found}, as_json, lambda: lines(found))
+
+
+@click.command()
+@click.option("--machines", type=click.IntRange(2, 128), default=48, show_default=True)
+@click.option("--split", type=click.Choice(["train", "test"]), default="test", show_default=True)
+@AS_JSON
+def told(machines: int, split: str, as_json: bool) -> None:
+    """Play the map of the beams' fleet as it is, and told what was charged at each speed of the job."""
+    from benchmarks.envs.told import lines
+    from benchmarks.envs.told import told as run
+
+    found = run(machines, split)
+    emit(found, as_json, lambda: lines(found))
+
+
+@click.command()
+@click.option("--machines", type=click.IntRange(2, 192), default=24, show_default=True)
+@click.option("--jobs", type=click.IntRange(2, 100), default=4, show_default=True, help="Of each machine.")
+@click.option("--kept", type=click.Path(dir_okay=False, path_type=Path), default=None, help="File of the returns.")
+@AS_JSON
+def job_memory(machines: int, jobs: int, kept: Path | None, as_json: bool) -> None:
+    """Let the map of the beams' fleet do several jobs on each machine, forgetting and remembering the earlier ones."""
+    from benchmarks.envs.job_memory import job_memory as run
+    from benchmarks.envs.job_memory import lines
+
+    found = run(machines, jobs, kept)
     emit({"rows": found}, as_json, lambda: lines(found))
 
 
@@ -187,5 +239,19 @@ def curves(runs: tuple[str, ...], table: Path, figure: str | None, level: str | 
     emit({"columns": COLUMNS, "runs": plain}, as_json, lambda: curve_lines(found))
 
 
-COMMANDS = (judges, mismatch, entry, arrivals, other_simulator, life, pool, audit, headroom, curves)
+COMMANDS = (
+    judges,
+    sense,
+    mismatch,
+    told,
+    job_memory,
+    entry,
+    arrivals,
+    other_simulator,
+    life,
+    pool,
+    audit,
+    headroom,
+    curves,
+)
 """All of them."""

@@ -20,7 +20,7 @@ from typing import Any
 import click
 
 from chaosgym.cli import COMMANDS, app, former
-from chaosgym.cli.options import ALL, recording_options
+from chaosgym.cli.options import KEYS, recording_options
 from chaosgym.files import write_atomically
 from chaosgym.machines import MACHINES
 
@@ -39,7 +39,7 @@ COMMON = """  --json                  Print one JSON object.
 """Options of several commands, which the list of commands explains."""
 
 OF_RECORDING = {
-    name for option in click.command()(recording_options(ALL)(lambda **_: None)).params for name in option.opts
+    name for option in click.command()(recording_options()(lambda **_: None)).params for name in option.opts
 }
 
 SHARED = {
@@ -63,9 +63,18 @@ def options(name: str) -> str:
     command = _command(name)
     texts = [_help(command, f"chaosgym {name}")]
     texts += [_options_of(command, machine) for machine in sorted(MACHINES)] if name == "show" else []
+    texts += [_keys()] if name == "judge" else []
     if isinstance(command, click.Group):
         texts += [_help(below, f"chaosgym {name} {inner}") for inner, below in sorted(command.commands.items())]
     return "\n\n".join(texts)
+
+
+def _keys() -> str:
+    """What ``--read`` takes, as a list of definitions."""
+    formatter = click.HelpFormatter(width=100)
+    with formatter.section("Keys of --read"):
+        formatter.write_dl([(f"{key}={one.example}", one.help) for key, one in KEYS.items()])
+    return "\n".join(line.rstrip() for line in formatter.getvalue().strip().splitlines())
 
 
 def _options_of(command: click.Command, machine: str) -> str:
@@ -87,6 +96,8 @@ def index() -> str:
             "# Commands",
             "",
             "A command prints lines for people, or one JSON object with `--json`. Progress goes to standard error.",
+            "What simulates for more than two seconds says there beforehand how much processor time it may take:",
+            "`sweep: up to about 40 s of processor time`.",
             "[answers.schema.json](../answers.schema.json) is the JSON schema of these objects, one for each command.",
             "",
             "Exit codes: 0 done; 1 a computation failed or a disk was full, the same command may go on from there; 2",
@@ -111,6 +122,10 @@ def index() -> str:
             "| former | write |",
             "|---|---|",
             *(f"| `{row.former}` | `{row.current}` |" for row in (*former.COMMANDS, *former.OPTIONS)),
+            *map(
+                _moved_key,
+                dict.fromkeys((option, key) for option, keys in former.KEYED.values() for key in keys.split()),
+            ),
             "",
         ]
     )
@@ -169,6 +184,15 @@ def _run(line: str, folder: Path) -> str:
     told = done.stdout.replace(str(Path.home()), "~").replace(platform.platform(), platform.system())
     lines = told.splitlines(keepends=True)
     return "".join([*lines[:LONGEST], "...\n"] if len(lines) > LONGEST else lines)
+
+
+def _moved_key(moved: tuple[str, str]) -> str:
+    """Row of an option that one of KEY=VALUE took the place of."""
+    new, key = moved
+    names = ", ".join(
+        f"`{name}`" for name, (option, keys) in former.KEYED.items() if option == new and key in keys.split()
+    )
+    return f"| `--{key} VALUE` of {names} | `{new} {key}=VALUE` |"
 
 
 def _last_part(name: str) -> str:

@@ -15,7 +15,7 @@ from PIL import Image
 from chaosgym import ImpactBeam, simulate
 from chaosgym.files import write_atomically
 
-SPEEDS = {"19 Hz: periodic": (19.0, "#1f77b4"), "30 Hz: chaotic": (30.0, "#d1495b")}
+SPEEDS = {"12 Hz: periodic": (12.0, "#1f77b4"), "30 Hz: chaotic": (30.0, "#d1495b")}
 """Title, speed and colour of each half."""
 
 CYCLES, FRAMES_PER_CYCLE, SAMPLES = 9, 12, 240

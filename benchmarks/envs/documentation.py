@@ -9,6 +9,7 @@ from pathlib import Path
 from typing import Any
 
 import gymnasium as gym
+import numpy as np
 
 from chaosgym.envs import ENVIRONMENTS
 from chaosgym.envs.drive import MOVES
@@ -17,6 +18,7 @@ from chaosgym.envs.judge import ExponentJudge
 from chaosgym.envs.levels import LEVELS, task_of, tolerances_of
 from chaosgym.envs.observation import MEANINGS
 from chaosgym.envs.task import Task
+from chaosgym.machines.accuracy import error_spread
 from chaosgym.machines.parameters import parameters_of
 
 KINDS = {
@@ -27,7 +29,8 @@ KINDS = {
 """What each task adds, by the end of the id's name."""
 
 ANY_MACHINE = "A machine of a broad family for each job, in shares of its own range of speed and of its rated force."
-"""What the id says of which the page is written by hand."""
+PLANT = "A machine that is not simulated here: an FMU of another program, or a class of yours."
+"""What the ids say of which the page is written by hand."""
 
 MACHINES = {
     "impact-beam": "A steel beam on a flexure pivot is shaken between pivot and tip, and its tip rattles between two "
@@ -47,6 +50,9 @@ JUDGES = {
     False: "The motion is judged as it runs. The peak forces of a step's last cycles are compared with those of the "
     "cycles before. A step is irregular if they differ, at every period up to eight, by more than 2 % of their mean.",
 }
+
+ESTIMATED = 32
+"""Machines of a task whose error is estimated."""
 
 FOLDER = Path(__file__).parent
 COMMON, TEXT = (FOLDER.joinpath(name).read_text(encoding="utf-8") for name in ("task.md", "page.md"))
@@ -74,6 +80,7 @@ def pages() -> Iterator[tuple[str, str]]:
             links[kind_of(name)].append(f"[`{name}`]({file})")
     rows = [f"{', '.join(links[kind])} | {meaning}" for kind, meaning in KINDS.items()]
     rows.append(f"[`chaosgym/AnyMachine-v0`](environments/AnyMachine.md) | {ANY_MACHINE}")
+    rows.append(f"[`chaosgym/Plant-v0`](how-to/fmus.md#train-an-agent-on-it) | {PLANT}")
     yield "environments.md", common(rows, known)
 
 
@@ -145,8 +152,18 @@ def page(names: list[str], env: Any) -> str:
         levels=_table("level | tolerances | growth of the clearance in a job", _levels(nominal)),
         disturbance=" ".join(noise),
         rung=nominal.rung or "none",
+        error=_errors(names, env),
         model=_model(env),
     )
+
+
+def _errors(names: list[str], env: Any) -> str:
+    """Estimated errors of the rung at machines and speeds of the level that varies most."""
+    fleet: Any = gym.make(names[0], level="fleet").unwrapped
+    variants = fleet.settings.variants
+    random = np.random.default_rng(0)
+    speeds = random.uniform(env.task.lowest_speed, env.task.highest_speed, ESTIMATED)
+    return error_spread([variants.drawn(random).at(speed) for speed in speeds.tolist()]).line
 
 
 def _unit(nominal: Any) -> str:

@@ -113,7 +113,10 @@ def largest_force(machine: MechanismMachine) -> float:
         fastest = max(fastest, float(np.ptp(moved, axis=0).max(initial=0.0)))
         mass += float(link.mass.sum() + link.inertia.sum() / max(machine.revolution.length, 1e-9) ** 2)
     for force in mechanism.forces:
-        load += float(np.abs(force.at(theta)).max())
+        load += float(np.abs(force.at(theta)).max()) / (machine.revolution.length if force.turns else 1.0)
+    for held in mechanism.torsion:
+        apart = z @ (mechanism.turn_of(held.second) - mechanism.turn_of(held.first)) - held.free_angle
+        load += held.stiffness * float(np.abs(apart).max()) / machine.revolution.length
     for spring in mechanism.springs:
         apart = mechanism.apart(z, spring.first, spring.second)[0]
         load += spring.stiffness * float(np.abs(np.linalg.norm(apart, axis=1) - spring.free_length).max())
@@ -122,7 +125,10 @@ def largest_force(machine: MechanismMachine) -> float:
     speed += 10.0 * load * machine.cycle_period / mass
     damper = max(contact.damping for contact in machine.contacts)
     largest = (math.sqrt(machine.stiffest * mass) + damper) * speed
-    if machine.hertz:
-        stiffness = max(contact.stiffness for contact in machine.contacts)
-        largest = (1.25 * mass * speed**2) ** 0.6 * stiffness**0.4 * (1.0 + damper * speed)
+    for contact in machine.contacts:
+        # all energy in one surface: K x^(n + 1) / (n + 1) = m v^2 / 2
+        n = contact.exponent
+        if n:
+            depth = (0.5 * (n + 1.0) * mass * speed**2 / contact.stiffness) ** (1.0 / (n + 1.0))
+            largest = max(largest, contact.stiffness * depth**n * (1.0 + damper * speed))
     return largest

@@ -6,7 +6,6 @@ from typing import Any
 from chaosgym.machines import ImpactBeam, Machine, SliderCrank
 from chaosgym.machines.mechanism.machine import MechanismMachine
 from chaosgym.machines.modal_machine.machine import ModalMachine
-from chaosgym.machines.modal_machine.varying import VaryingMachine
 
 Extremes = Mapping[str, Mapping[str, Any]]
 
@@ -62,7 +61,6 @@ EXTREMES: Mapping[type[Machine], Extremes] = {
         "gravity 100 m/s2": {"gravity": 100.0},
     },
     ModalMachine: _OF_MODES,
-    VaryingMachine: _OF_MODES,
     MechanismMachine: {"no gravity": {"gravity_factor": 0.0}},
 }
 

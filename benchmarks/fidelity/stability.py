@@ -25,7 +25,8 @@ from benchmarks.fidelity.extremes import extremes_of
 from chaosgym.errors import ChaosgymError
 from chaosgym.machines import Machine
 from chaosgym.machines.parameters import parameters_of, with_settings
-from chaosgym.simulation import CycleRecord, ExactEvents, Integrator, RungeKutta4, parallel_map, simulate
+from chaosgym.simulation import CycleRecord, ExactEvents, Integrator, RungeKutta4, simulate
+from chaosgym.simulation.parallel import parallel_map
 
 Outcome = Literal["answer", "named error", "failure"]
 
@@ -125,7 +126,7 @@ def stability_map(machine: Machine, *, workers: int | None = None, progress: boo
 def runs_of(machine: Machine) -> list[Run]:
     """All runs of the map."""
     ladder = machine.fidelity_ladder
-    fixed = [rung for rung in ladder if with_settings(machine, {"fidelity": rung}).runs_fixed_steps]
+    fixed = [rung for rung in ladder if with_settings(machine, {"fidelity": rung}).moving.fixed_steps]
     runs = [
         Run(extreme, rung, _changed(machine, {"fidelity": rung}, fields), None)
         for extreme, fields in extremes_of(machine).items()

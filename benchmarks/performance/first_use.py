@@ -14,7 +14,6 @@ import tempfile
 import time
 from collections.abc import Sequence
 from typing import Any
-from unittest.mock import patch
 
 from numba.core import event
 
@@ -30,18 +29,23 @@ WARM = (
 REPEATS = 5
 
 _PICTURE = """
-import os, time
+import asyncio, os
 from bokeh.document import Document
+from bokeh.events import DocumentReady
 from chaosgym.explore.page import Page
 from chaosgym.machines import ImpactBeam
 
-document = Document()
-page = Page(document, ImpactBeam())
-while not len(page._sources["motion"].data["time"]):
-    time.sleep(0.005)
-    for told in document.session_callbacks:
-        document.remove_next_tick_callback(told)
-        told.callback()
+async def picture():
+    document = Document()
+    page = Page(document, ImpactBeam())
+    document.callbacks.trigger_event(DocumentReady())
+    while not len(page._sources["motion"].data["time"]):
+        await asyncio.sleep(0.005)
+        for told in document.session_callbacks:
+            document.remove_next_tick_callback(told)
+            told.callback()
+
+asyncio.run(picture())
 os._exit(0)  # whatever the diagram is at
 """
 """Opens the page of explore, without a browser, until the first picture is there."""
@@ -72,10 +76,9 @@ class _Spent(event.Listener):  # type: ignore[misc] # numba has no types
 def compiled(words: Sequence[str]) -> None:
     """Run a command of this package and print what each function took that it compiled [s], as rows of a table."""
     from chaosgym.cli import app
-    from chaosgym.core import compilation
 
-    spent, alone = _Spent(), patch.object(compilation, "compile_beside")
-    with alone, event.install_listener("numba:compile", spent), contextlib.redirect_stdout(io.StringIO()):
+    spent = _Spent()
+    with event.install_listener("numba:compile", spent), contextlib.redirect_stdout(io.StringIO()):
         app(list(words), standalone_mode=False)
     for name, seconds in spent.rows:
         print(f"{seconds:.3f} {name}")
@@ -91,23 +94,21 @@ def _processor_seconds(command: Sequence[str], environment: dict[str, str] | Non
 
 
 def cold_start(commands: Sequence[Sequence[str]] = COLD) -> dict[str, Any]:
-    """Run commands without any compiled kernels.
+    """Run commands without any compiled kernels, shipped ones included.
 
     Returns
     -------
     dict
-        By command: ``wall_seconds``, with the processes that it compiles in; ``seconds`` of processor time of one
-        process that compiles all, and its ``functions``, a list of (name, seconds without those within), the dearest
-        first; a function that is compiled for several types is there as often.
+        By command: ``wall_seconds``, ``seconds`` of processor time, and ``functions``, a list of (name, seconds
+        without those within), the dearest first; a function that is compiled for several types is there as often.
     """
     result = {}
     for words in commands:
-        with tempfile.TemporaryDirectory() as folder, tempfile.TemporaryDirectory() as other:
+        with tempfile.TemporaryDirectory() as folder:
             began = time.perf_counter()
-            _processor_seconds([sys.executable, "-m", "chaosgym", *words], {**os.environ, "NUMBA_CACHE_DIR": other})
-            wall = time.perf_counter() - began
-            environment = {**os.environ, "NUMBA_CACHE_DIR": folder}
+            environment = {**os.environ, "NUMBA_CACHE_DIR": folder, "CHAOSGYM_KERNELS": "none"}
             seconds, printed = _processor_seconds([sys.executable, "-c", _CHILD, *words], environment)
+            wall = time.perf_counter() - began
         rows = [line.split() for line in printed.splitlines()]
         functions = sorted(((name, float(spent)) for spent, name in rows), key=lambda row: -row[1])
         result[" ".join(words)] = {"wall_seconds": wall, "seconds": seconds, "functions": functions}

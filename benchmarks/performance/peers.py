@@ -18,6 +18,7 @@ from benchmarks.performance.exudyn_machines import ExudynSetting, run_in_exudyn
 from benchmarks.performance.rates import BEAM
 from benchmarks.performance.timing import processor_seconds
 from chaosgym.arrays import Array
+from chaosgym.machines import ImpactBeam
 from chaosgym.machines.integrators import TIGHTEST_EVENTS
 from chaosgym.simulation import RungeKutta4, simulate
 
@@ -39,6 +40,9 @@ class Peer(NamedTuple):
     cycles_per_second: float
     error: float
 
+
+EQUAL_STEP = 5e-6
+"""Step [s] by which fixed steps reach an error of about 1e-3 on the default beam."""
 
 Run = tuple[float, Array]
 """Processor time [s] of a cycle of a beam, and peak force [N] of each cycle on the upper stop."""
@@ -71,6 +75,23 @@ def peers(speeds: tuple[float, ...] = SPEEDS, beams: int = SIDE_BY_SIDE) -> list
             error = float(np.max(np.abs(peaks[:FIRST] - exact) / exact))
             found.append(Peer(name, frequency, 1.0 / seconds, error))
     return found
+
+
+def ratios(frequency: float) -> dict[str, tuple[float, float]]:
+    """The default beam at a frequency [Hz]: by program, how many times the time of exact events, and its error."""
+    beam = ImpactBeam(excitation_frequency=frequency)
+    exact = simulate(beam, FIRST, integrator=TIGHTEST_EVENTS).peak_force[:, 0]
+    own, _ = _simulated(beam, cycles=1_000, step=None)
+    programs: dict[str, Callable[[Any], Run]] = {
+        "Exudyn, RK44, 5 us": lambda beam: _exudyn(beam, EQUAL_STEP),
+        "numba, RK4, 5 us": partial(_simulated, cycles=100, step=EQUAL_STEP),
+        "SciPy, DOP853, rtol 1e-6": lambda beam: _scipy(beam, "DOP853"),
+    }
+    runs = {name: run(beam) for name, run in programs.items()}
+    return {
+        name: (seconds / own, float(np.max(np.abs(peaks[:FIRST] - exact) / exact)))
+        for name, (seconds, peaks) in runs.items()
+    }
 
 
 def _simulated(beam: Any, cycles: int, step: float | None) -> Run:
@@ -223,3 +244,9 @@ def _mujoco(beam: Any, step: float) -> Run:
         mujoco.set_mjcb_passive(None)
     peaks: Array = forces.reshape(FIRST, -1).max(axis=1)
     return seconds, peaks
+
+
+if __name__ == "__main__":
+    for speed in (30.0, 19.0, 10.0):
+        for program, (ratio, error) in ratios(speed).items():
+            print(f"{speed:g} Hz  {program:28s} {ratio:8.0f} times  error {error:.1e}")

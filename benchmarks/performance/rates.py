@@ -19,7 +19,7 @@ import numba
 import numpy as np
 from tqdm import tqdm
 
-from benchmarks.performance.timing import Rate, kernel_time, rate
+from benchmarks.performance.timing import KernelTime, Rate, kernel_time, rate
 from chaosgym.classifier import default_classifier
 from chaosgym.machines import MACHINES, ImpactBeam, Machine, SliderCrank
 from chaosgym.simulation import ExactEvents, Integrator, RungeKutta4, simulate
@@ -57,6 +57,9 @@ RANGE = [
 RANGE_CYCLES = 100
 """Cycles of a timed run at each."""
 
+LOOP = 1000
+"""Steps of logistic maps in the reference loops, which each computer can run."""
+
 Measure = Callable[[Any, int], Rate]
 
 
@@ -68,8 +71,9 @@ def benchmark(repeats: int = 5, *, progress: bool = False) -> dict[str, Any]:
     dict
         ``range``, the mean over the beam's range and its ends, then ``cycles``, ``env_steps``, ``vector_env_steps``,
         ``sweep_points``, ``classifier_rows``: by name, how many
-        ``per_second`` and ``per_processor_second``. ``step_microseconds``, see ``step_cost``. ``load_average``: how
-        busy the computer was before and after.
+        ``per_second`` and ``per_processor_second``. ``step_microseconds``, see ``step_cost``. ``in_loops``: the
+        beam's mean cycle and the Python of each step, in ``reference_loops``. ``load_average``: how busy the computer
+        was before and after.
     """
     beam, crank = BEAM, CRANK
     environments = {name: name for name in _environments()}
@@ -89,8 +93,47 @@ def benchmark(repeats: int = 5, *, progress: bool = False) -> dict[str, Any]:
                 bar.update()
     ours = [name for name in environments if name not in OTHER_ENVIRONMENTS]
     results["step_microseconds"] = {name: step_cost(name, repeats) for name in ours}
+    loops, (mean, *_) = reference_loops(repeats), results["range"].items()
+    results["in_loops"] = {f"compiled, {mean[0]}": 1e6 / mean[1]["per_processor_second"] / loops["compiled"]} | {
+        f"Python of a step, {name}": cost["python"] / loops["python"]
+        for name, cost in results["step_microseconds"].items()
+    }
     results["load_average"]["after"] = os.getloadavg()[0]
     return results
+
+
+def logistic(steps: int) -> float:
+    """One logistic map in chaos."""
+    x = 0.4
+    for _ in range(steps):
+        x = 3.9 * x * (1.0 - x)
+    return x
+
+
+def logistics(steps: int) -> Any:
+    """As many logistic maps at once as keep a processor busy."""
+    x = np.linspace(0.1, 0.4, 64)
+    for _ in range(steps):
+        for i in range(len(x)):
+            x[i] = 3.9 * x[i] * (1.0 - x[i])
+    return x
+
+
+def reference_loops(repeats: int) -> dict[str, float]:
+    """Processor time [us] of ``LOOP`` steps: of 64 logistic maps, "compiled", and of one in "python".
+
+    What a computer is slower in these it may be slower in everything: ratios to them compare computers.
+    """
+    found = {}
+    for name, loop, times in (("compiled", numba.njit(logistics), 200), ("python", logistic, 50)):
+
+        def run(loop: Callable[[int], Any] = loop, times: int = times) -> int:
+            for _ in range(times):
+                loop(LOOP)
+            return times
+
+        found[name] = 1e6 / rate(run, repeats).per_processor_second
+    return found
 
 
 def beam_range(repeats: int) -> dict[str, dict[str, float]]:
@@ -168,25 +211,41 @@ def env_rate(name: str, repeats: int) -> Rate:
 def step_cost(name: str, repeats: int) -> dict[str, float]:
     """Processor time [us] of a step of a single environment, and what of it is ``python``: all but the kernel.
 
-    Medians over the steps of ``repeats`` equal runs on one thread, after one that is not counted.
+    ``warm`` is that of a kernel whose results are written again, so that it leaves the caches as they are. Medians over
+    the steps of ``repeats`` equal runs on one thread, after one that is not counted.
     """
     env, steps = gym.make(name), STEPS[name.partition("/")[0]][0]
     actions = np.random.default_rng(0).integers(0, 6, steps)
-    taken, threads = [], numba.get_num_threads()
+    moved: list[tuple[float, float]] = []
+    warm: list[tuple[float, float]] = []
+    threads = numba.get_num_threads()
     numba.set_num_threads(1)
     with kernel_time() as kernels:
-        for _ in range(1 + repeats):
-            env.reset(seed=0)
-            for action in actions:
-                kernels.seconds, start = 0.0, time.thread_time()
-                _, _, terminated, truncated, _ = env.step(action)
-                step = time.thread_time() - start
-                taken.append((1e6 * step, 1e6 * (step - kernels.seconds)))
-                if terminated or truncated:
-                    env.reset()
+        for _ in range(repeats):
+            moved += _steps_taken(env, actions, kernels)
+        kernels.written = []
+        _steps_taken(env, actions, kernels)
+        kept, kernels.written = kernels.written, None
+        for _ in range(repeats):
+            kernels.replayed = iter(kept)
+            warm += _steps_taken(env, actions, kernels)
     numba.set_num_threads(threads)
-    whole, python = (statistics.median(column) for column in zip(*taken[steps:], strict=True))
-    return {"step": whole, "python": python}
+    whole, python = (statistics.median(column) for column in zip(*moved, strict=True))
+    return {"step": whole, "python": python, "warm": statistics.median(python for _, python in warm)}
+
+
+def _steps_taken(env: Any, actions: Any, kernels: KernelTime) -> list[tuple[float, float]]:
+    """Processor time [us] of each step of a run, and what of it is no kernel."""
+    taken = []
+    env.reset(seed=0)
+    for action in actions:
+        kernels.seconds, start = 0.0, time.thread_time()
+        _, _, terminated, truncated, _ = env.step(action)
+        step = time.thread_time() - start
+        taken.append((1e6 * step, 1e6 * (step - kernels.seconds)))
+        if terminated or truncated:
+            env.reset()
+    return taken
 
 
 def vector_env_rate(name: str, repeats: int) -> Rate:

@@ -7,6 +7,7 @@ import statistics
 import tempfile
 import tracemalloc
 from collections.abc import Callable
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -17,6 +18,8 @@ from chaosgym.classifier import classifier_for
 from chaosgym.diagnosis import diagnose
 from chaosgym.explore.point import orbit_diagram, sliders_of, view_of
 from chaosgym.machines import ImpactBeam
+from chaosgym.machines.accuracy import model_within
+from chaosgym.machines.parameters import with_settings
 from chaosgym.simulation import simulate
 from chaosgym.sweeps import SweepPlan, run_sweep
 from chaosgym.sweeps.plan import default_axes
@@ -43,6 +46,11 @@ def waits(repeats: int = 5) -> dict[str, float]:
     def each(ask: Callable[[ImpactBeam], object]) -> float:
         return _median(lambda: [ask(other) for other in others()], repeats) / POINTS
 
+    choose = partial(model_within, tolerance="1 %")
+
+    def longer(other: ImpactBeam) -> ImpactBeam:
+        return with_settings(other, {"length": beam.length * random.uniform(0.9, 1.1)})
+
     plan = SweepPlan(beam, default_axes(beam, "random"), "random", POINTS)
 
     def sweep() -> None:
@@ -54,6 +62,9 @@ def waits(repeats: int = 5) -> dict[str, float]:
         "classify a random beam, nature": each(lambda other: classifier.classify(other, types=False)),
         "classify a random beam, types": each(lambda other: classifier.classify(other)),
         "diagnose a random beam": each(diagnose),
+        "diagnose a random beam, budget 800": each(partial(diagnose, budget=800)),
+        "model within 1 %, new speed": each(choose),
+        "model within 1 %, new beam": each(lambda other: choose(longer(other))),
         "move of a slider in explore": each(view_of),
         "orbit diagram in explore": _median(lambda: list(orbit_diagram(beam, sliders_of(beam)[0])), repeats),
         "point of a sweep": _median(sweep, repeats) / POINTS,

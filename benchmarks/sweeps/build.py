@@ -20,6 +20,7 @@ from benchmarks.sweeps.agreement import Agreement, agreement
 from chaosgym.errors import DatasetError
 from chaosgym.files import write_atomically
 from chaosgym.machines import MACHINES
+from chaosgym.series.verdict import Definition
 from chaosgym.sweeps.axes import Axis
 from chaosgym.sweeps.dataset import DATA_FILE, LabelledSweep, parquet_writer, read_sweep, schema, signal_columns
 from chaosgym.sweeps.plan import SweepPlan
@@ -27,12 +28,13 @@ from chaosgym.sweeps.run import run_sweep
 
 
 class Recipe(NamedTuple):
-    """Options of a dataset: crosses, seed of their draw, cycles by point at the most, and the axes."""
+    """Options of a dataset: crosses, seed of their draw, cycles by point at the most, axes, definition of labels."""
 
     crosses: int
     seed: int
     budget: int
     axes: tuple[str, ...]
+    definition: Definition = "settled"
 
 
 def _recipes() -> dict[str, Recipe]:
@@ -68,7 +70,8 @@ def dataset_plan(machine: str, crosses: int | None = None) -> SweepPlan:
     recipe = RECIPES[machine]
     axes = tuple(Axis.parse(text) for text in recipe.axes)
     kind: Any = MACHINES[machine]
-    return SweepPlan(kind(), axes, "crosses", crosses or recipe.crosses, recipe.seed, recipe.budget, signals=1.0)
+    size, definition = crosses or recipe.crosses, recipe.definition
+    return SweepPlan(kind(), axes, "crosses", size, recipe.seed, recipe.budget, signals=1.0, definition=definition)
 
 
 def sample_of(whole: LabelledSweep) -> LabelledSweep:
@@ -81,7 +84,9 @@ def sample_of(whole: LabelledSweep) -> LabelledSweep:
     """
     plan = whole.plan
     if plan.sampling != "crosses" or plan.signals < 1.0:
-        raise DatasetError("a sample is taken of crosses with the signals of all points: --crosses N --signals 1")
+        raise DatasetError(
+            "a sample is taken of crosses with the signals of all points: --sampling crosses:N --label signals=1"
+        )
     part = replace(plan, size=min(plan.size, SAMPLE_CROSSES), signals=SAMPLE_SIGNALS)
     table = whole.table.slice(0, len(part))
     left_out = pa.array(~part.with_signals(range(len(part))))

@@ -23,13 +23,12 @@ def sweep_command(plan: SweepPlan, folder: str) -> str:
             words += ["--set", f"{name}={value}"]
     for axis in plan.axes:
         words += ["--axis", str(axis)]
-    options = {"random": "--random", "sobol": "--sobol", "crosses": "--crosses"}
-    if plan.sampling in options:
-        words += [options[plan.sampling], str(plan.size)]
-    words += ["--seed", str(plan.seed), "--budget", str(plan.budget)]
-    for option, share in (("--signals", plan.signals), ("--full-types", plan.full_types)):
-        words += [option, f"{share:g}"] if share else []
-    words += ["--initial-states", str(plan.initial_states)] if plan.full_types else []
+    words += ["--sampling", "grid" if plan.sampling == "grid" else f"{plan.sampling}:{plan.size}:{plan.seed}"]
+    words += ["--budget", str(plan.budget)]
+    labels = {"definition": plan.definition, "signals": f"{plan.signals:g}", "full-types": f"{plan.full_types:g}"}
+    labels |= {"initial-states": str(plan.initial_states)} if plan.full_types else {}
+    for key, value in labels.items():
+        words += ["--label", f"{key}={value}"]
     return shlex.join([*words, "--out", folder])
 
 
@@ -96,14 +95,21 @@ def _balance(classes: Mapping[str, Any]) -> str:
     return "## Class balance\n\n" + "\n".join(lines)
 
 
+def _died_out(plan: SweepPlan, faults: Mapping[str, int]) -> str:
+    if plan.definition == "settled":
+        return "; `transient_chaos` says how long it lasted where it died out before"
+    return f", and so does chaos that died out within it: status *transient*, {faults['transient']:,} rows"
+
+
 def _trust(plan: SweepPlan, info: Mapping[str, Any]) -> str:
     faults, types = info["faults"], info["types"]
     lines = [
-        f"- Horizon: {plan.budget} cycles from rest. Chaos that dies out later counts as chaotic, and so does chaos "
-        f"that died out within it: status *transient*, {faults['transient']:,} rows.",
+        f"- Horizon: {plan.budget} cycles from rest. Chaos that dies out later counts as chaotic"
+        f"{_died_out(plan, faults)}.",
         f"- {faults['undetermined']:,} rows are undetermined, {faults['failed']:,} could not be run, "
         f"{faults['disputed']:,} are disputed between tests.",
     ]
+    lines.append(f"- Model: {info['model']['rung'] or 'its own'}; {info['model']['told']}.")
     votes = info["two_step"]
     if votes and votes["agreement"] is not None:
         lines.append(

@@ -15,7 +15,8 @@ from chaosgym.diagnosis import ResponseType, diagnose, response_type
 from chaosgym.errors import DatasetError
 from chaosgym.machines import Machine
 from chaosgym.series import TYPES
-from chaosgym.simulation import parallel_map
+from chaosgym.series.verdict import Definition
+from chaosgym.simulation.parallel import parallel_map
 from chaosgym.sweeps.dataset import LabelledSweep
 from chaosgym.sweeps.label import RETRY
 
@@ -70,21 +71,31 @@ def region_types(sweep: LabelledSweep, points: int, seed: int = 0, progress: boo
         If the dataset is not one of crosses.
     """
     if sweep.plan.sampling != "crosses":
-        raise DatasetError(f"sampling = {sweep.plan.sampling!r} has no crosses; needed: a sweep with --crosses")
+        raise DatasetError(
+            f"sampling = {sweep.plan.sampling!r} has no crosses; needed: a sweep with --sampling crosses:N"
+        )
     told = sweep.column("response_type")
     centres = np.flatnonzero([kind is not None for kind in told])
     rows = np.random.default_rng(seed).permutation(centres)[:points]
     machines = [
         sweep.plan.machine_at({name: float(sweep.column(name)[row]) for name in sweep.plan.fields}) for row in rows
     ]
-    judge = partial(_judge, budget=sweep.plan.budget)
+    judge = partial(_judge, budget=sweep.plan.budget, definition=sweep.plan.definition)
     found = parallel_map(judge, machines, progress="regions" if progress else None)
     pairs = Counter((str(told[row]), one.type) for row, one in zip(rows, found, strict=True))
     return RegionTypes(pairs, sum(one.type == "III" and one.centre.nature == "periodic" for one in found))
 
 
-def _judge(machine: Machine, budget: int) -> ResponseType:
+def _judge(machine: Machine, budget: int, definition: Definition) -> ResponseType:
     centre = diagnose(machine, budget=budget)
     if centre.nature == "undetermined":
         centre = diagnose(machine, budget=RETRY * budget)
-    return response_type(machine, window="speed-clearance", initial_states=1, budget=budget, centre=centre, workers=1)
+    return response_type(
+        machine,
+        window="speed-clearance",
+        initial_states=1,
+        budget=budget,
+        definition=definition,
+        centre=centre,
+        workers=1,
+    )

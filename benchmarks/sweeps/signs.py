@@ -35,7 +35,9 @@ def sign_rates(sweep: LabelledSweep) -> dict[str, Rate]:
         If the dataset is not one of crosses.
     """
     if sweep.plan.sampling != "crosses":
-        raise DatasetError(f"sampling = {sweep.plan.sampling!r} has no crosses; needed: a sweep with --crosses")
+        raise DatasetError(
+            f"sampling = {sweep.plan.sampling!r} has no crosses; needed: a sweep with --sampling crosses:N"
+        )
     natures = np.array([nature or "undetermined" for nature in sweep.column("nature")]).reshape(-1, len(CROSS))
     known = natures != "undetermined"
     chaos = known & (natures != "periodic")

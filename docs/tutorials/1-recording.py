@@ -97,5 +97,5 @@ plt.show()
 #
 # ```bash
 # chaosgym judge docs/data/peaks.csv --column upper --sensor-error "1 N" \
-#     --load-rating "500 N" --out report.html
+#     --load-rating "500 N" --report report.html
 # ```

@@ -26,13 +26,16 @@ if TYPE_CHECKING:
     from chaosgym.diagnosis.step_check import step_check
     from chaosgym.errors import ChaosgymError, ParameterError, SimulationError
     from chaosgym.machines import THESIS_SLIDER_CRANK, ImpactBeam, SliderCrank
+    from chaosgym.machines.accuracy import accuracy_of
     from chaosgym.machines.machine_file import read_machine
     from chaosgym.machines.modal_machine import Drive, Joint, ModalMachine, Structure, machine_with_joints
+    from chaosgym.plants.fmu import FmuPlant
     from chaosgym.recordings.judge import judge_peaks
     from chaosgym.recordings.monitor import Monitor
     from chaosgym.recordings.read import read_recording
     from chaosgym.series import Diagnosis, two_step_test
-    from chaosgym.simulation import CycleRecord, ExactEvents, RungeKutta4, simulate, simulate_many
+    from chaosgym.simulation import CycleRecord, ExactEvents, RungeKutta4, simulate
+    from chaosgym.simulation.parallel import simulate_many
     from chaosgym.sweeps import Axis, SweepPlan, read_sweep, run_sweep
 
 _HOME = {
@@ -41,10 +44,12 @@ _HOME = {
     "chaosgym.control.operator": ("Operator",),
     "chaosgym.diagnosis": ("diagnose", "response_map", "response_type"),
     "chaosgym.branches.diagram_search": ("follow",),
+    "chaosgym.plants.fmu": ("FmuPlant",),
     "chaosgym.recordings.judge": ("judge_peaks",),
     "chaosgym.diagnosis.step_check": ("step_check",),
     "chaosgym.errors": ("ChaosgymError", "ParameterError", "SimulationError"),
     "chaosgym.machines": ("THESIS_SLIDER_CRANK", "ImpactBeam", "SliderCrank"),
+    "chaosgym.machines.accuracy": ("accuracy_of",),
     "chaosgym.machines.machine_file": ("read_machine",),
     "chaosgym.machines.modal_machine": (
         "Drive",
@@ -56,7 +61,8 @@ _HOME = {
     "chaosgym.recordings.monitor": ("Monitor",),
     "chaosgym.recordings.read": ("read_recording",),
     "chaosgym.series": ("Diagnosis", "two_step_test"),
-    "chaosgym.simulation": ("CycleRecord", "ExactEvents", "RungeKutta4", "simulate", "simulate_many"),
+    "chaosgym.simulation": ("CycleRecord", "ExactEvents", "RungeKutta4", "simulate"),
+    "chaosgym.simulation.parallel": ("simulate_many",),
     "chaosgym.sweeps": ("Axis", "SweepPlan", "read_sweep", "run_sweep"),
 }
 _MODULE_OF = {name: module for module, names in _HOME.items() for name in names}
@@ -69,6 +75,7 @@ __all__ = [
     "Diagnosis",
     "Drive",
     "ExactEvents",
+    "FmuPlant",
     "ImpactBeam",
     "Joint",
     "MachineClassifier",
@@ -83,6 +90,7 @@ __all__ = [
     "Structure",
     "SweepPlan",
     "__version__",
+    "accuracy_of",
     "classifier_for",
     "default_classifier",
     "diagnose",

@@ -17,6 +17,7 @@ from chaosgym.control.controllers import BackOff, Follow
 from chaosgym.control.policies import TrainedPolicy, save_policy, shipped_policy
 from chaosgym.control.policies.export import exported
 from chaosgym.control.rollout import Played, Policy, play
+from chaosgym.envs.vector_env import native_envs
 from chaosgym.errors import ChaosgymError, DatasetError
 from chaosgym.machines import ImpactBeam
 from chaosgym.series import two_step_test
@@ -112,6 +113,20 @@ def run_demo(
     }
     result["seconds"] = time.perf_counter() - began
     return result
+
+
+def most_cycles(train: bool = False) -> int:
+    """Cycles of a demo in which no point of the sweep repeats soon.
+
+    Examples
+    --------
+    >>> from chaosgym.demo import most_cycles
+    >>> most_cycles() < most_cycles(train=True)
+    True
+    """
+    plan, task = SweepPlan(ImpactBeam(), AXES), native_envs(ENVIRONMENT).task
+    played = 3 * MACHINES * task.steps + (TRAINING_STEPS if train else 0)
+    return len(plan) * plan.budget + played * task.cycles_per_step
 
 
 def _draw(path: Path, name: str, *results: Any) -> Path:

@@ -1,5 +1,22 @@
 """Every error that chaosgym raises on purpose, so that one ``except ChaosgymError`` catches them all."""
 
+from collections.abc import Iterable
+
+
+def nearest_or(otherwise: str, name: object, known: Iterable[str]) -> str:
+    """End of a message about an unknown name: the nearest known one, or what is said ``otherwise``.
+
+    Examples
+    --------
+    >>> from chaosgym.errors import nearest_or
+    >>> nearest_or("allowed: speed, clearance", "sped", ["speed", "clearance"])
+    'did you mean speed?'
+    """
+    from difflib import get_close_matches
+
+    near = get_close_matches(str(name), list(known), n=1)
+    return f"did you mean {near[0]}?" if near else otherwise
+
 
 class ChaosgymError(Exception):
     """Base of all errors of this package; the message says what to do.

@@ -73,6 +73,24 @@ def replaceable(path: str | Path) -> Path:
     return target
 
 
+def check_place(path: str | Path) -> None:
+    """Try whether a file can be written under a name, before hours are spent on what it shall hold.
+
+    Raises
+    ------
+    ChaosgymError
+        If its folder takes no file, or something is under the name that is no file.
+    """
+    import tempfile
+
+    target = replaceable(path)
+    try:
+        with tempfile.TemporaryFile(dir=target.parent):
+            pass
+    except OSError as error:
+        raise ChaosgymError(f"{target.parent} takes no file: {error.strerror}; choose another folder") from None
+
+
 def _kind(mode: int) -> str:
     kinds = ((stat.S_ISDIR, "a folder"), (stat.S_ISFIFO, "a pipe"), (stat.S_ISSOCK, "a socket"))
     return next((word for test, word in kinds if test(mode)), "a device")
@@ -227,42 +245,9 @@ def toml_of(path: str | Path) -> tuple[str, dict[str, Any]]:
     except RecursionError:
         raise ValueError("is not valid TOML: too many brackets") from None
     except ValueError as error:  # of tomllib, of the encoding, and of whole numbers with thousands of digits
-        raise ValueError(f"is not valid TOML: {first_line(error).split(';')[0]}") from None
-
-
-MOST_CELLS = 500_000_000
-"""Rows times columns that a Parquet file may have: a small one may claim many."""
-
-
-def parquet_of(source: Any, columns: list[str] | None = None) -> Any:
-    """Table of a Parquet file, or some columns of it.
-
-    Parameters
-    ----------
-    source
-        Path or stream.
-    columns
-        Names; all by default.
-
-    Raises
-    ------
-    ValueError
-        If it can't be read, or claims more cells than ``MOST_CELLS``; the message goes on after the name of the file.
-    """
-    import pyarrow as pa
-    import pyarrow.parquet as pq
-
-    try:
-        with pq.ParquetFile(source, page_checksum_verification=True) as file:
-            about = file.metadata
-            cells = about.num_rows * (about.num_columns if columns is None else len(columns))
-            if cells > MOST_CELLS:
-                raise ValueError(f"it claims {cells} cells; allowed: up to {MOST_CELLS}")
-            return file.read(columns)
-    except OSError as error:
-        raise ValueError(f"can't be read as Parquet: {error.strerror or first_line(error)}") from None
-    except (pa.ArrowException, MemoryError, ValueError, KeyError, TypeError) as error:
-        raise ValueError(f"can't be read as Parquet: {first_line(error)}") from None
+        told = first_line(error).split(";")[0]
+        twice = "; allowed: each key once, and [[NAME]] for each of several tables" if "Cannot" in told else ""
+        raise ValueError(f"is not valid TOML: {told}{twice}") from None
 
 
 def first_line(error: BaseException) -> str:

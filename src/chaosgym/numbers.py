@@ -1,5 +1,10 @@
-"""Numbers from files, archives and programs: validation of kind, shape, finiteness and range; a summary of many."""
+"""Numbers from files, archives and programs: validation of kind, shape, finiteness and range; a summary of many.
 
+``number`` and ``whole`` are the check of every argument of a public function that is one number: they refuse NaN,
+infinity, texts and truth values, and name argument, value and range.
+"""
+
+import math
 import reprlib
 from typing import Any
 
@@ -7,7 +12,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from chaosgym.arrays import Array
-from chaosgym.errors import ParameterError
+from chaosgym.errors import ChaosgymError, ParameterError
 
 REAL = "iuf"
 """Kinds of arrays that hold numbers: no complex ones, no texts, no truth values, no objects."""
@@ -24,30 +29,89 @@ def shown(given: Any) -> str:
         return "a whole number of thousands of digits"
 
 
-def number(name: str, given: Any, low: float, high: float, unit: str = "") -> float:
+MOST_SEED = 2**63 - 1
+"""Largest seed that Parquet and JSON hold."""
+
+MOST = 10**9
+"""Largest whole number where nothing else bounds it: cycles of months of computing."""
+
+
+def number(
+    name: str,
+    given: Any,
+    low: float,
+    high: float = math.inf,
+    unit: str = "",
+    *,
+    inside: bool = False,
+    error: type[ChaosgymError] = ParameterError,
+) -> float:
     """Return a finite number in its range.
+
+    Parameters
+    ----------
+    name
+        For the message.
+    given
+        Any real number of Python or numpy.
+    low, high
+        Range, ends included [``unit``]; without ``high`` any finite number from ``low`` on.
+    inside
+        Leave the ends out.
+    error
+        What is raised.
 
     Raises
     ------
     ParameterError
         Otherwise; names it, the value and what is allowed.
+
+    Examples
+    --------
+    >>> from chaosgym.numbers import number
+    >>> number("share", 0.5, 0.0, 1.0), number("rate", 2000, 0.0, unit="Hz", inside=True)
+    (0.5, 2000.0)
     """
-    allowed = f"allowed: {low:g} to {high:g}{unit and ' '}{unit}"
+    value = _real(given)
+    there = not math.isnan(value) and math.isfinite(value) and low <= value <= high
+    if there and not (inside and value in (low, high)):
+        return value
+    unit = f" {unit}" if unit else ""
+    if math.isinf(low):
+        allowed = "a finite number"
+    elif math.isinf(high):
+        allowed = f"above {low:g}{unit}" if inside else f"{low:g}{unit} or more"
+    else:
+        allowed = f"above {low:g}, below {high:g}{unit}" if inside else f"{low:g} to {high:g}{unit}"
+    told = f"{value:g}{unit}" if math.isfinite(value) or isinstance(given, float) else shown(given)
+    raise error(f"{name} = {told} is out of range; allowed: {allowed}")
+
+
+def _real(given: Any) -> float:
+    """A number, infinite where it is too large for one; NaN for all that is none."""
+    if isinstance(given, bool | str | bytes | np.bool_) or not hasattr(given, "__float__") or np.ndim(given):
+        return math.nan
     try:
-        value = float(given)
-    except (TypeError, ValueError, OverflowError):
-        raise ParameterError(f"{name} = {shown(given)} is out of range; {allowed}") from None
-    if not low <= value <= high:
-        raise ParameterError(f"{name} = {value:g}{unit and ' '}{unit} is out of range; {allowed}")
-    return value
+        return float(given)
+    except OverflowError:
+        return math.inf
+    except (TypeError, ValueError):
+        return math.nan
 
 
-def whole(name: str, given: Any, low: int, high: int) -> int:
-    """Return a whole number in its range; raises as ``number``, and for fractions."""
-    value = number(name, given, low, high)
-    if value != int(value):
-        raise ParameterError(f"{name} = {value:g} is out of range; allowed: whole numbers from {low} to {high:,}")
-    return int(value)
+def whole(name: str, given: Any, low: int, high: int = MOST, *, error: type[ChaosgymError] = ParameterError) -> int:
+    """Return a whole number in its range; raises as ``number``, and for fractions.
+
+    Examples
+    --------
+    >>> from chaosgym.numbers import whole
+    >>> whole("cycles", 100.0, 1)
+    100
+    """
+    value = _real(given)
+    if math.isfinite(value) and value == math.floor(value) and low <= int(given) <= high:
+        return int(given)
+    raise error(f"{name} = {shown(given)} is out of range; allowed: whole numbers from {low} to {high:,}")
 
 
 def numbers(

@@ -7,14 +7,14 @@ N·m, N*m, Nm and N m are one, as are m², m2 and m^2.
 
 import math
 import re
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from typing import Any
 
 from chaosgym.errors import ParameterError
 from chaosgym.numbers import shown
 
 ALTERNATIVES: Mapping[str, Mapping[str, float]] = {
-    "m": {"m": 1.0, "mm": 1e-3, "um": 1e-6, "in": 25.4e-3},
+    "m": {"m": 1.0, "mm": 1e-3, "um": 1e-6, "in": 25.4e-3, "mil": 25.4e-6, "thou": 25.4e-6},
     "Hz": {"Hz": 1.0, "kHz": 1e3, "rpm": 1.0 / 60.0},
     "rpm": {"rpm": 1.0, "Hz": 60.0},
     "N": {"N": 1.0, "kN": 1e3, "mN": 1e-3, "lbf": 4.4482216152605},
@@ -56,6 +56,8 @@ ALTERNATIVES: Mapping[str, Mapping[str, float]] = {
         "N m/arcmin": 10_800.0 / math.pi,
     },
     "N m s/rad": {"N m s/rad": 1.0, "mN m s/rad": 1e-3, "N mm s/rad": 1e-3, "N m s/deg": 180.0 / math.pi},
+    "N m/rad^1.5": {"N m/rad^1.5": 1.0},
+    "s/rad": {"s/rad": 1.0},
     "rad/(N m)": {"rad/(N m)": 1.0, "deg/(N m)": math.pi / 180.0, "arcmin/(N m)": math.pi / 10_800.0},
     "kg m^2": {"kg m^2": 1.0, "kg cm^2": 1e-4, "kg mm^2": 1e-6, "g cm^2": 1e-7, "g mm^2": 1e-9, "t m^2": 1e3},
     "rad/s^2": {"rad/s^2": 1.0, "deg/s^2": math.pi / 180.0},
@@ -75,6 +77,8 @@ TURNING: Mapping[str, str] = {
     "kg m": "kg m^2",
     "m/s": "rad/s",
     "m/s^2": "rad/s^2",
+    "N/m^1.5": "N m/rad^1.5",
+    "s/m": "s/rad",
     "kg^-1/2": "kg^-1/2 m^-1",
     "kg^1/2": "kg^1/2 m",
 }
@@ -116,7 +120,7 @@ def parse_quantity(name: str, given: Any, unit: str, allowed: Mapping[str, float
         return _finite(name, given, given, 1.0)
     number, written = _split(given)
     try:
-        float(number)
+        as_float(number)
     except ValueError:
         what = (
             "is several numbers; allowed: one, which holds at all times"
@@ -126,18 +130,48 @@ def parse_quantity(name: str, given: Any, unit: str, allowed: Mapping[str, float
         raise ParameterError(f"{name} = {shown(given)} {what}") from None
     if written not in allowed:
         what = f"has the unknown unit {shown(written)}" if written else "has no unit"
-        raise ParameterError(f"{name} = {shown(given)} {what} (allowed: {listed})")
+        meant = [each for each in allowed if each and each.lower() == written.lower()]
+        hint = f"; did you mean {' or '.join(meant)}?" if meant else ""
+        raise ParameterError(f"{name} = {shown(given)} {what}{hint} (allowed: {listed})")
     return _finite(name, given, number, allowed[written])
 
 
 def _finite(name: str, given: Any, number: Any, size: float) -> float:
     try:
-        value = float(number) * size
+        value = (as_float(number) if isinstance(number, str) else float(number)) * size
     except OverflowError:
         value = math.inf
     if not math.isfinite(value):
         raise ParameterError(f"{name} = {shown(given)} is no finite number that a computer holds")
     return value
+
+
+def as_float(text: str) -> float:
+    """Number of a text; none with ``_`` in it, which Python takes for a separator: ``0_1`` is a slip for ``0.1``.
+
+    Raises
+    ------
+    ValueError
+        If it is none.
+    """
+    if "_" in text or not text.isascii():
+        raise ValueError(f"{text!r} is no number")
+    return float(text)
+
+
+def check_share(name: str, given: Any, values: Iterable[float]) -> None:
+    """Refuse bare numbers above 1 for what is usually written in %: the sign was probably forgotten.
+
+    Raises
+    ------
+    ParameterError
+        If there is one; says how to write it.
+    """
+    texts = given if isinstance(given, list) else [given]
+    if max(values, default=0.0) > 1.0 and not all(isinstance(text, str) and "%" in text for text in texts):
+        raise ParameterError(
+            f'{name} = {shown(given)} is above 1 and has no unit; write it in %, as in {name} = "4 %" for 0.04'
+        )
 
 
 _NUMBER = r"[-+]?(?:\d+\.?\d*|\.\d+)(?:[eE][-+]?\d+)?"
@@ -181,11 +215,11 @@ def parse_option(name: str, text: str, unit: str, bare: str) -> float:
         If the unit is unknown, or the number is none; says what is allowed.
     """
     try:
-        value, written = float(text), ""
+        value, written = as_float(text), ""
     except ValueError:
         number, written = _split(text)
         try:
-            value = float(number)
+            value = as_float(number)
         except ValueError:
             listed = ", ".join(filter(None, units_of(unit)))
             told = f", nor one with a unit ({listed})" if listed else ""
@@ -199,13 +233,13 @@ def duration(seconds: float, digits: int = 4) -> str:
     Examples
     --------
     >>> from chaosgym.units import duration
-    >>> duration(0.05), duration(50_000.0), duration(3e-7)
-    ('50 ms', '13.89 h', '300 ns')
+    >>> duration(0.05), duration(50_000.0), duration(3e-7), duration(112.0, 2)
+    ('50 ms', '13.89 h', '300 ns', '110 s')
     """
     sizes = {"h": 7200.0, "min": 120.0, "s": 1.0, "ms": 1e-3, "µs": 1e-6, "ns": 0.0}
     unit = next((name for name, least in sizes.items() if seconds >= least * (1.0 - 1e-9)), "ns")
     size = {"h": 3600.0, "min": 60.0, "s": 1.0, "ms": 1e-3, "µs": 1e-6, "ns": 1e-9}[unit]
-    return f"{seconds / size:.{digits}g} {unit}"
+    return f"{float(f'{seconds / size:.{digits}g}'):g} {unit}"
 
 
 LOOKS_SCALED = (100.0, 10_000.0)

@@ -9,11 +9,13 @@ import sys
 from pathlib import Path
 
 import gymnasium as gym
+import numpy as np
 import pytest
 
 import chaosgym
 from chaosgym.control.policies import load_policy
 from chaosgym.control.rollout import play
+from chaosgym.envs.sense import STATISTICS, load_sense
 
 AGENTS = Path(__file__).parent.parent.parent / "agents"
 BEAM = "chaosgym/ImpactBeamTolerance-v1"
@@ -25,6 +27,7 @@ SMALL = {
     "constrained_ppo": ("--envs", "8", "--rollout", "60", "--batch", "240"),
     "sac": ("--envs", "8", "--gradient-steps", "1"),
 }
+SCRIPTS = ("ppo", "recurrent_ppo", "learn_map", "learn_sense")
 FIRST = {"ppo": 11_000, "recurrent_ppo": 960, "constrained_ppo": 960, "sac": 960}
 """Steps of the first run: more than those of a row, and of the other scripts a job of each machine."""
 
@@ -80,6 +83,22 @@ def test_a_map_is_learned_from_jobs_that_are_not_run_again(tmp_path):
     for objective in ("irregular", "life"):
         job = play(load_policy(tmp_path / "whole"), BEAM, range(2), level="fleet", objective=objective, steps=20)
         assert job.deviation.max() < 3.0
+
+
+def test_a_sense_is_learned_from_rounds_that_are_not_run_again(tmp_path):
+    """A run that goes on has the bytes of one that never stopped, and its sense tells probabilities."""
+    small = ("--envs", "4", "--epochs", "2", "--units", "16", "--keywords", '{"level": "fleet", "split": "train"}')
+    _train("learn_sense", tmp_path / "whole", 960, *small)
+    _train("learn_sense", tmp_path / "parts", 480, *small)
+    first = (tmp_path / "parts" / "sense.npz").read_bytes()
+    _train("learn_sense", tmp_path / "parts", 960, *small)
+    assert first != (tmp_path / "parts" / "sense.npz").read_bytes() == (tmp_path / "whole" / "sense.npz").read_bytes()
+    rows = list(csv.DictReader((tmp_path / "whole" / "progress.csv").read_text().splitlines()))
+    assert [row["epoch"] for row in rows] == ["1", "2"]
+    assert float(rows[1]["cross_entropy"]) < float(rows[0]["cross_entropy"])
+    sense = load_sense(tmp_path / "whole" / "sense.npz")
+    told = sense(np.random.default_rng(0).uniform(1.0, 50.0, (5, len(STATISTICS))))
+    assert ((told > 0.0) & (told < 1.0)).all()
 
 
 @pytest.mark.slow
@@ -159,7 +178,7 @@ for level in ("clearance", "fleet"):
 
 @pytest.mark.parametrize(
     ("script", "text"),
-    [("ppo", "{"), ("ppo", "[1]"), *((script, '{"tolerancs": 1}') for script in ("ppo", "recurrent_ppo", "learn_map"))],
+    [("ppo", "{"), ("ppo", "[1]"), ("learn_sense", "[1]"), *((script, '{"tolerancs": 1}') for script in SCRIPTS)],
 )
 def test_keywords_that_are_none_end_in_one_line(script, text, tmp_path, monkeypatch, capsys):
     """No JSON, no object, no keyword of the environment: exit code 2 and one line that says so."""

@@ -101,7 +101,7 @@ def test_a_sample_is_taken_of_crosses_with_all_signals(made):
     """A sweep that kept fewer would promise signals that it lacks."""
     whole = read_sweep(made / "whole")
     poor = replace(whole, settings={**whole.settings, "signals": 0.5})
-    with pytest.raises(DatasetError, match="--crosses N --signals 1"):
+    with pytest.raises(DatasetError, match="--sampling crosses:N --label signals=1"):
         sample_of(poor)
 
 

@@ -4,15 +4,18 @@ import json
 import sys
 from abc import ABC, abstractmethod
 from collections.abc import Iterator
+from dataclasses import InitVar
 from importlib import import_module
 from pathlib import Path
-from typing import ClassVar
+from typing import ClassVar, final
 
 import click
 import pytest
 from click.testing import CliRunner
 
+import chaosgym
 from benchmarks.cli import app
+from benchmarks.cli.house import CIRCLES
 from benchmarks.house import of_sources
 from benchmarks.house.options import options_by_command
 from benchmarks.house.package import Package
@@ -131,7 +134,17 @@ class _Base(ABC):
 
 
 class _Protocol(_Base):
+    scale: InitVar[float | None] = None
+
     def draw(self) -> None: ...
+
+    @final
+    def draw_twice(self) -> None: ...
+
+    @property
+    @final
+    def size(self) -> int:
+        return 2
 
 
 class _Implemented(_Protocol):
@@ -141,7 +154,7 @@ class _Implemented(_Protocol):
 
 
 def test_members_that_must_be_given() -> None:
-    """An abstract method and a class variable without a value must be given; what is private does not count."""
+    """An abstract method and a class variable without a value must be given; what is private or final counts not."""
     assert members(_Protocol) == {"must_give": 2, "may_give": 2}
     assert members(_Implemented) == {"must_give": 0, "may_give": 4}
 
@@ -169,6 +182,13 @@ def test_options_of_machines_stand_apart() -> None:
         "set up": {"own": 1, "of_machines": 0, "of_a_named_machine": 0},
         "all": {"own": 2, "of_machines": 2, "of_a_named_machine": 1},
     }
+
+
+def test_the_library_has_no_circle_and_no_class_name_twice() -> None:
+    """No module reaches itself by imports, those for types and those within functions among them."""
+    found = of_sources(Package(Path(chaosgym.__file__).parent))
+    assert {kind: circle["modules"] for kind, circle in found["circles"].items()} == {kind: [] for kind in CIRCLES}
+    assert found["classes_named_twice"]["modules"] == {}
 
 
 def test_a_clearance_reaches_a_kernel() -> None:

@@ -82,15 +82,17 @@ def test_every_rate_comes_out_positive(monkeypatch: pytest.MonkeyPatch) -> None:
     assert set(result["env_steps"]) >= {"chaosgym/ImpactBeam-v1", "chaosgym/SliderCrank-v1", "CartPole-v1"}
     assert set(result["vector_env_steps"]) == set(result["env_steps"])
     for cost in result["step_microseconds"].values():
-        assert cost["python"] < cost["step"]
+        assert 0.0 < cost["warm"] < cost["python"] < cost["step"]
     figures = [
         figure
         for quantity, named in result.items()
-        if quantity not in ("load_average", "commit")
+        if quantity not in ("load_average", "commit", "in_loops")
         for both in named.values()
         for figure in both.values()
     ]
     assert len(figures) >= 16
+    assert all(loops > 0.0 for loops in result["in_loops"].values())
+    assert len(result["in_loops"]) == 1 + len(result["step_microseconds"])
     mean, cheapest, dearest = (both["per_processor_second"] for both in result["range"].values())
     assert dearest <= mean <= cheapest
     assert all(math.isfinite(figure) and figure > 0.0 for figure in figures)

@@ -23,7 +23,7 @@ from chaosgym.diagnosis import diagnose
 from chaosgym.diagnosis.periodic_orbit import PRECISE, find_periodic_orbit, run_period
 from chaosgym.errors import ParameterError
 from chaosgym.machines import ImpactBeam
-from chaosgym.machines.linear_impact import damping_for
+from chaosgym.machines.contact_law import damping_for
 from chaosgym.machines.modal_machine import Drive, ModalMachine, Structure
 from chaosgym.machines.parameters import with_settings
 from chaosgym.simulation import simulate
@@ -447,7 +447,7 @@ def points_along(curve, places):
     for place in places:
         tangent = (curve(place + 1e-6) - curve(place - 1e-6)) / 2e-6
         x, along = (np.array([z.real, z.imag]) for z in (curve(place), tangent / abs(tangent)))
-        kind = {"matrix": np.eye(1), "slope": np.zeros(1), "impacts": (0,), "peaks": np.ones(1)}
+        kind = {"matrix": np.eye(1), "solved": np.eye(1), "slope": np.zeros(1), "impacts": (0,), "peaks": np.ones(1)}
         points.append(OrbitPoint(x=x, tangent=along, symmetric=False, halved=False, phase=0.0, **kind))
     return points
 
@@ -591,7 +591,14 @@ def test_a_curve_ends_where_only_another_one_is_found(monkeypatch):
 def test_the_orbit_of_half_the_period_is_none_of_the_branch():
     """Near where it began Newton's method may fall from a doubled branch to the other; ends of half the period stay."""
     doubled, single = (
-        SimpleNamespace(x=np.array([place, 0.0]), tangent=np.array([1.0, 0.0]), slope=np.zeros(1), halved=halved)
+        SimpleNamespace(
+            x=np.array([place, 0.0]),
+            tangent=np.array([1.0, 0.0]),
+            slope=np.zeros(1),
+            solved=np.eye(1),
+            halved=halved,
+            impacts=(1,),
+        )
         for place, halved in ((0.0, False), (0.5, True))
     )
     last = SimpleNamespace(**{**vars(doubled), "x": np.array([1.0, 0.0])})

@@ -144,4 +144,4 @@ def test_the_commands_print_margins_and_branches(tmp_path):
     assert min(abs(one["value"] - flip) for one in flips) < 1e-7
     assert table.read_text().startswith('"branch","period","speed","kind"')
     chaotic = CliRunner().invoke(app, ["diagnose", "impact-beam", "--budget", "100", "--margins"])
-    assert "no margins: they need a periodic response that is proven, this one is chaotic" in chaotic.output
+    assert "no margins: they need an orbit that is proven to attract, this response is chaotic" in chaotic.output

@@ -170,7 +170,7 @@ def test_without_signals_records_are_an_error_that_says_why(sweep):
     names = [name for name in sweep.table.column_names if "start" not in name and "settled" not in name]
     bare = train_classifier(LabelledSweep(sweep.table.select(names), sweep.settings)).classifier
     assert list(bare.stages) == [0]
-    with pytest.raises(ModelFileError, match="--signals"):
+    with pytest.raises(ModelFileError, match="signals=SHARE"):
         bare.classify_record(settled(3.9))
 
 

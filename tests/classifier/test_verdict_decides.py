@@ -110,3 +110,13 @@ def test_a_verdict_within_the_error_leaves_no_learned_irregularity():
     assert answer.nature_probabilities == {}
     scattering = replace(calm, condition="if its scatter of 2 % is random")
     assert LEARNED.under(scattering).irregular is True
+
+
+def test_probabilities_stand_only_beside_a_plausible_nature():
+    """A nature that is likelier than chaos, and yet outside what is plausible, is the verdict's alone."""
+    peaks = 100.0 + np.random.default_rng(5).normal(size=300)
+    learned = default_classifier("impact-beam").classify_record(peaks)
+    assert (learned.nature, learned.plausible) == ("periodic", ("chaotic",))
+    found = learned.under(judge_peaks(peaks).diagnosis)
+    assert (found.nature, found.plausible, dict(found.nature_probabilities)) == ("periodic", (), {})
+    assert found.reason == "the verdict contradicts what is learned"

@@ -58,6 +58,7 @@ QUICK = {
     "simulate": "impact-beam --cycles 3 --out p.csv --series-out s.csv --plot m.png; slider-crank --cycles 2",
     "show": f"impact-beam; {CRANK} --plot c.png",
     "new-machine": "; four-bar --out four-bar.toml",
+    "export": f"impact-beam --fmu b.fmu; {CRANK} --fmu c.fmu --samples 8",
     "diagnose": "impact-beam --frequency-hz 19 --types --margins --kicks 2; impact-beam;"
     "impact-beam --test two-step --budget 400; slider-crank --test mut",
     "judge": f"{PEAKS}; {DOCS}/data/peaks.csv --column 'upper,lower'; {PEAKS} --load-rating '500 N'",
@@ -78,7 +79,7 @@ QUICK = {
 LONG = {
     "fit": f"impact-beam --frequency-hz 30 {PEAKS} --estimate clearance",
     "branch": 'impact-beam --along "speed=17:18.2 Hz:5" --workers 1 --out o.csv;'
-    'impact-beam --along "speed=17.3:17.7 Hz:3" --against "clearance=0.120mm:0.134mm:3" --workers 1',
+    'impact-beam --fidelity standard --along "speed=17.3:17.7 Hz:3" --against "clearance=0.12mm:0.134mm:3" --workers 1',
     "tradeoff": "impact-beam --points 1 --cycles 20 --transient 20 --budget 0.05 --workers 1",
     "compare": f'{BEAM} --machines 2 --only "follow the demand" --out scores.parquet',
     "design": f"brief.toml --workers 1 --plot b.png; brief.toml other.toml --workers 1;"

@@ -13,8 +13,11 @@ import pyarrow.parquet as pq
 import pytest
 
 from chaosgym.cli import main
+from chaosgym.machines.machine_file import template
 from chaosgym.simulation import simulate
 from tests.classifier.made_up import settled
+from tests.diagnosis.machine_files import written
+from tests.machines.test_initial_state import JUMP
 from tests.plain_modes import PLAIN_BEAM
 
 KEYS = {
@@ -105,6 +108,15 @@ def test_a_fresh_process_answers_as_compiled_kernels_do(model):
         assert here["nature_probabilities"].keys() == there["nature_probabilities"].keys()
         for name, chance in here["nature_probabilities"].items():
             assert chance == pytest.approx(there["nature_probabilities"][name], rel=1e-4)
+
+
+def test_a_record_of_a_machine_from_a_file_is_refused_with_what_judges_it(tmp_path):
+    """In a new process too: none has learned such records, and no setting of the computer is blamed."""
+    (tmp_path / "own.toml").write_text(template(), encoding="utf-8")
+    command = [sys.executable, "-m", "chaosgym", "classify", tmp_path / "own.toml", "-"]
+    done = subprocess.run(command, input=lines_of(settled(3.2, 40)), capture_output=True, text=True)
+    assert (done.returncode, done.stdout) == (2, "")
+    assert "`chaosgym judge` judges them without one" in done.stderr
 
 
 def test_a_machine_is_answered_with_its_proof():
@@ -241,3 +253,10 @@ def test_shipped_classifier_judges_a_simulated_record():
         answer = json.loads(out)
         assert answer["irregular"] is irregular
         assert answer["nature"] == ("undetermined" if irregular else "periodic")
+
+
+def test_a_type_from_rest_says_so(tmp_path):
+    """Beside the jump of a gap flies a rattle that rest does not reach: the type is told as one from rest alone."""
+    _, told, _ = run(machine=written(tmp_path, JUMP))
+    assert "Type I from rest, periodic, period 1" in told
+    assert "judged by runs from rest alone; `chaosgym diagnose --types` looks for other motions" in told

@@ -104,3 +104,13 @@ def test_commands_use_one_blas_thread():
     )
     found = subprocess.run([sys.executable, "-c", program], capture_output=True, text=True, check=True)
     assert set(json.loads(found.stdout)) == {1}
+
+
+def test_a_warning_is_one_line():
+    """A command tells what the library warns of, and no line of its code."""
+    code = (
+        "import warnings, click; from chaosgym.cli import run_command\n"
+        "run_command(click.command()(lambda: warnings.warn('the sensor is dead')))"
+    )
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True)
+    assert (done.returncode, done.stderr) == (0, "note: the sensor is dead\n")

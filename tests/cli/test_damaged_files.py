@@ -6,6 +6,7 @@ import zipfile
 from pathlib import Path
 
 import numpy as np
+import pyarrow as pa
 import pyarrow.parquet as pq
 import pytest
 
@@ -111,3 +112,38 @@ def test_numbers_that_are_none_end_in_one_line(arguments, tmp_path):
     *progress, error = err.splitlines()
     assert error.startswith("Error: ")
     assert all(line.endswith(" s") for line in progress)
+
+
+TITLES = {
+    "a newline": "a\nb [N]",
+    "500,000 letters": "a" * 500_000 + " [N]",
+    "250,000 words": "b " * 250_000,
+    "a unit of 500,000 letters": f"a [{'N' * 500_000}]",
+    "500,000 newlines": "\n" * 500_000 + "f [N]",
+}
+
+
+@pytest.mark.parametrize("kind", ["csv", "parquet", "h5"])
+@pytest.mark.parametrize("title", TITLES.values(), ids=TITLES)
+def test_a_title_of_many_lines_or_letters_spoils_no_answer(kind, title, tmp_path):
+    """As many lines as with a plain title, none of them long, whatever writes the file; JSON as published."""
+
+    def told(name, file):
+        path = tmp_path / f"{file}.{kind}"
+        peaks = [30.0 + number % 2 for number in range(60)]
+        if kind == "csv":
+            path.write_text(f'cycle;"{name}"\n' + "".join(f"{k};{peak}\n" for k, peak in enumerate(peaks)))
+        elif kind == "parquet":
+            pq.write_table(pa.table({"cycle": range(60), name: peaks}), path)
+        else:
+            h5py = pytest.importorskip("h5py")
+            with h5py.File(path, "w") as data:
+                data[name[:60_000]] = peaks  # HDF5 holds no longer name
+        code, out, err = run("judge", path)
+        assert code == 0, err[:1000]
+        return out.splitlines()
+
+    plain, lines = told("force [N]", "plain"), told(title, "odd")
+    assert len(lines) == len(plain)
+    assert max(map(len, lines)) < max(map(len, plain)) + 500
+    assert lines[0].split(": ", 1)[1:] == plain[0].split(": ", 1)[1:]

@@ -2,9 +2,11 @@
 
 from pathlib import Path
 
+import numpy as np
 import pytest
 
 from benchmarks.sweeps.card import dataset_card
+from chaosgym.machines.accuracy import accuracy_of
 from chaosgym.sweeps import read_sweep
 from tests.cli.run import run, run_json
 
@@ -17,12 +19,12 @@ SWEEP = (
     "excitation_frequency=18:30",
     "--axis",
     "clearance=1e-4:1.4e-4:log",
-    "--crosses",
-    "10",
+    "--sampling",
+    "crosses:10",
     "--budget",
     "100",
-    "--full-types",
-    "0.9",
+    "--label",
+    "full-types=0.9",
 )
 
 
@@ -55,6 +57,17 @@ def test_an_unfinished_folder_says_how_far_it_is(folder, tmp_path):
     info = run_json("dataset", "info", str(tmp_path))
     assert (info["complete"], info["rows"]["finished"]) == (False, 0)
     assert "unfinished" in run("dataset", "info", str(tmp_path))[1]
+
+
+def test_the_error_of_the_one_model_is_that_of_the_machines(folder):
+    """A dataset keeps its rung: what is printed of it is the estimate at points of the plan, each by itself."""
+    plan, found = read_sweep(folder).plan, run_json("dataset", "info", str(folder))["model"]
+    errors = [accuracy_of(machine).error for machine in plan.sample(32)]
+    finite = [error for error in errors if error is not None]
+    assert found["estimated_error"]["largest"] == max(finite)
+    assert found["estimated_error"]["median"] == pytest.approx(np.median(finite))
+    assert found["estimated_error"]["estimated"] == len(finite) <= len(errors) == found["estimated_error"]["machines"]
+    assert f"- Model: {plan.machine.rung}; {found['told']}." in dataset_card(read_sweep(folder), folder)
 
 
 def test_card_holds_the_command_that_makes_the_dataset_again(folder):
@@ -99,13 +112,23 @@ def test_map_is_drawn(folder, tmp_path):
         (("dataset", "build", "impact-beam", "--crosses", "2"), "`python -m benchmarks build-dataset MACHINE`"),
         (("dataset", "card", "."), "`chaosgym dataset info FOLDER`"),
         (("stability", "impact-beam"), "`python -m benchmarks stability MACHINE`"),
-        (("sweep", "impact-beam", "--crosses", "3", "--random", "3", "--out", "o"), "exclude each other"),
+        (("sweep", "impact-beam", "--sampling", "crosses:3:", "--out", "o"), "allowed: grid|random:N"),
         (
-            ("sweep", "impact-beam", "--crosses", "3", "--axis", "length=0.27:0.28", "--out", "o"),
+            ("sweep", "impact-beam", "--sampling", "crosses:3", "--axis", "length=0.27:0.28", "--out", "o"),
             "crosses need an axis",
         ),
-        (("sweep", "impact-beam", "--random", "3", "--axis", "lenth=0.27:0.28", "--out", "o"), "'lenth' is no field"),
-        (("sweep", "impact-beam", "--random", "3", "--signals", "2", "--out", "o"), "signals = 2 is out of range"),
+        (
+            ("sweep", "impact-beam", "--sampling", "random:3", "--axis", "lenth=0.27:0.28", "--out", "o"),
+            "'lenth' is no field",
+        ),
+        (
+            ("sweep", "impact-beam", "--sampling", "random:3", "--label", "signals=2", "--out", "o"),
+            "signals = 2 is out",
+        ),
+        (
+            ("sweep", "impact-beam", "--label", "signals=1", "--label", "signals=0", "--out", "o"),
+            "signals is stated twice",
+        ),
     ],
 )
 def test_bad_input_is_one_line(arguments, message, tmp_path, monkeypatch):

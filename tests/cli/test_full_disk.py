@@ -10,11 +10,13 @@ from pathlib import Path
 import pytest
 
 from tests import small_demo
-from tests.cli.test_answers import BEAM, LONG, MAP, PEAKS, QUICK
+from tests.cli.run import run
+from tests.cli.test_answers import BEAM, DOCS, LONG, MAP, PEAKS, QUICK
 from tests.test_kills import LEARNED
 
 pytestmark = pytest.mark.skipif(not Path("/dev/full").exists(), reason="there is no /dev/full")
 
+MOON = f"{DOCS}/machines/moon-shaw-1983.toml"
 WRITING = (
     "simulate impact-beam --cycles 300 --out p.csv",
     "simulate impact-beam --cycles 300 --out p.parquet",
@@ -24,7 +26,7 @@ WRITING = (
     f"judge {PEAKS} --plot d.png",
     f"overlay impact-beam {PEAKS} --out o.png",
     f"{MAP} --out sweep",
-    f'judge {PEAKS} --load-rating "500 N" --out r.html',
+    f'judge {PEAKS} --load-rating "500 N" --report r.html',
     f"run-agent {BEAM} --out j.gif",
     f'compare {BEAM} --machines 2 --only "follow the demand" --out s.parquet',
     "train-classifier --data ../made --out learned",
@@ -32,15 +34,22 @@ WRITING = (
 )
 """Commands that write more than a thousand bytes into a file."""
 
+SHORT = (f"design {MOON} --out r.html", "monitor --log l.csv")
+"""Others, which tell as soon that they can't write."""
+
 
 def ended(command, **options):
     """(Exit code, lines on standard error but for signs of progress) of a command of chaosgym."""
     program = [small_demo.__file__] if command.startswith("demo") else ["-m", "chaosgym"]
     words = [sys.executable, *program, *shlex.split(command)]
     done = subprocess.run(words, stdin=subprocess.DEVNULL, stderr=subprocess.PIPE, text=True, check=False, **options)
-    lines = done.stderr.replace("\r", "\n").splitlines()
-    progress = re.compile(r"\s*|.*\|.*|.*: \d+ s|./4 .*| +picture: .*")
-    return done.returncode, [line for line in lines if not progress.fullmatch(line)]
+    return done.returncode, without_progress(done.stderr)
+
+
+def without_progress(error):
+    """Lines of a text that are no signs of progress."""
+    progress = re.compile(r"\s*|.*\|.*|.*: \d+ s|./4 .*| +picture: .*|compiling .*|.*: up to .* processor time")
+    return [line for line in error.replace("\r", "\n").splitlines() if not progress.fullmatch(line)]
 
 
 def say_no_space(code, told):
@@ -81,7 +90,7 @@ def test_every_command_ends_cleanly_on_a_full_disk_and_with_a_closed_output(tmp_
             continue
         with Path("/dev/full").open("wb") as full:
             assert say_no_space(*ended(command, cwd=tmp_path, stdout=full)), command
-        fresh = re.sub(r"--(\S*)out (\S+)", r"--\1out second-\2", command)
+        fresh = re.sub(r"--(\S*out|fmu) (\S+)", r"--\1 second-\2", command)
         assert ended(fresh, cwd=tmp_path, preexec_fn=lambda: os.close(1)) == (0, []), command
 
 
@@ -100,3 +109,34 @@ def test_every_file_on_a_full_disk_is_one_line(tmp_path):
         if path.is_file() and (path.name != ".lock" and path.suffix not in (".json", ".toml"))
     ]
     assert left == []
+
+
+PLACES = {
+    "no folder": "nowhere/{}",
+    "no folder, but a file": "file/{}",
+    "a file system that is only read": "/proc/{}",
+    "a name that no file can have": "x" * 300 + "{}",
+}
+"""Where nothing can be written, whoever asks."""
+
+
+@pytest.mark.parametrize(
+    "place", [pytest.param(one, marks=() if "only read" in one else pytest.mark.slow) for one in PLACES]
+)
+@pytest.mark.parametrize("command", [one for one in (*WRITING, *SHORT) if not one.startswith(("demo", "train", MAP))])
+def test_where_nothing_can_be_written_is_one_line_at_once(command, place, tmp_path, monkeypatch):
+    """Exit 1 or 2, before minutes are spent on what can't be kept; what is there stays."""
+    if command.startswith("compare") and place == "no folder":
+        return  # it makes one, as for all files that it goes on with
+    monkeypatch.chdir(tmp_path)
+    (tmp_path / "file").write_text("mine")
+    form = PLACES[place]
+    command = re.sub(r"(--(?:out|plot|report|log|series-out) )(\S+)", lambda one: one[1] + form.format(one[2]), command)
+    code, _, error = run(*shlex.split(command))
+    told = without_progress(error)
+    assert code in (1, 2), told
+    assert len(told) == 1
+    assert told[0].startswith("Error: ")
+    assert len(told[0]) < 500
+    assert (tmp_path / "file").read_text() == "mine"
+    assert os.listdir(tmp_path) == ["file"]

@@ -1,5 +1,6 @@
 """Ctrl-C ends every command at once, whatever it computes."""
 
+import json
 import os
 import signal
 import subprocess
@@ -30,7 +31,18 @@ COMMANDS = {
     "revolutions of a million steps": ("simulate", "slider-crank", "--set", "n_modes=16", "--cycles", "1000"),
     "revolutions of millions of steps": ("simulate", *REVOLUTION, "--cycles", "100"),
     "a diagnosis": ("diagnose", *REVOLUTION),
-    "a sweep": ("sweep", "impact-beam", "--sobol", "100000", "--budget", "100000", "--workers", "2", "--out", "OUT"),
+    "a sweep": (
+        "sweep",
+        "impact-beam",
+        "--sampling",
+        "sobol:100000",
+        "--budget",
+        "100000",
+        "--workers",
+        "2",
+        "--out",
+        "OUT",
+    ),
 }
 
 
@@ -63,6 +75,49 @@ def test_compiled_code_is_left_and_python_ends_by_itself(work, code, says):
         process.send_signal(signal.SIGINT)
         assert says in "".join(process.communicate(timeout=60))
         assert process.returncode == code
+
+
+RIG = """
+import sys, time
+class Rig:
+    steps = 0
+    def reset(self): pass
+    def run(self, speed, cycles):
+        self.steps += 1
+        if self.steps == 4:
+            print("runs", file=sys.stderr, flush=True)
+            time.sleep(60.0)
+        return [80.0] * cycles
+    def stop(self):
+        print("brakes", file=sys.stderr, flush=True)
+        time.sleep(3.0 * GRACE)
+        print("stands", file=sys.stderr, flush=True)
+"""
+
+
+@pytest.mark.parametrize("asked", [["SIGINT"], ["SIGTERM"], ["SIGHUP"], ["SIGINT", "SIGINT"]])
+def test_a_machine_is_brought_to_rest_first(asked, tmp_path, monkeypatch):
+    """However long it brakes, with its steps kept; asked twice, the command ends at once."""
+    (tmp_path / "rig.py").write_text(RIG.replace("GRACE", str(GRACE_SECONDS)))
+    monkeypatch.chdir(tmp_path)
+    ask = ("run-agent", "chaosgym/ImpactBeamTolerance-v1", "--plant", "rig:Rig", "--json")
+    with _started("-m", "chaosgym", *ask) as process:
+        heard = ""
+        for number, mark in zip(asked, ("runs", "Stopping the machine"), strict=False):
+            while mark not in heard:
+                line = process.stderr.readline()
+                assert line, heard
+                heard += line
+            process.send_signal(getattr(signal, number))
+        out, rest = process.communicate(timeout=60)
+    heard += rest
+    assert process.returncode == ABORTED
+    assert "brakes" in heard
+    assert "Traceback" not in heard
+    assert ("stands" in heard) is (len(asked) == 1)
+    if len(asked) == 1:
+        assert "Ctrl-C; 2 steps of the job Kriging were played" in heard
+        assert len(json.loads(out)["speed"]) == 2
 
 
 def test_the_watch_ends_with_the_command():

@@ -73,7 +73,7 @@ def test_simulated_peaks_are_read_back(tmp_path):
             "simulate",
             "impact-beam",
             "--frequency-hz",
-            "1140 rpm",
+            "1200 rpm",
             "--cycles",
             80,
             "--transient",
@@ -84,7 +84,9 @@ def test_simulated_peaks_are_read_back(tmp_path):
         )
         assert code == 0, err
         peaks = json.loads(out)["surfaces_peak_force_N"]["upper"]
-        code, _, err = run("judge", path)
+        both = json.loads(run("judge", path, "--json")[1])
+        assert [one["column"] for one in both["recordings"]] == ["upper", "lower"]
+        code, _, err = run("overlay", "impact-beam", path, "--out", tmp_path / "o.png")
         assert code == 2
         assert "'upper', 'lower'; use --column NAME" in err
         for command in COMMANDS:
@@ -99,14 +101,14 @@ def test_simulated_peaks_are_read_back(tmp_path):
 def test_a_guessed_cycle_stands_in_the_headline(tmp_path):
     """Where the cycle of a series is estimated, the nature of all three commands stands under that condition."""
     path = tmp_path / "series.csv"
-    run("simulate", "impact-beam", "--frequency-hz", 19, "--cycles", 40, "--transient", 200, "--series-out", path)
+    run("simulate", "impact-beam", "--frequency-hz", 20, "--cycles", 40, "--transient", 200, "--series-out", path)
     for command in COMMANDS:
         code, out, err = run(*command, path, "--column", "force")
         assert code == 0, err
-        assert "periodic, period 1, if the cycle is 52.63 ms" in out
+        assert "periodic, period 1, if the cycle is 50 ms" in out
     code, out, _ = run("judge", path, "--column", "force", "--json")
-    assert json.loads(out)["condition"] == "if the cycle is 52.63 ms"
-    code, out, _ = run("judge", path, "--column", "force", "--cycle", "19 Hz")
+    assert json.loads(out)["condition"] == "if the cycle is 50 ms"
+    code, out, _ = run("judge", path, "--column", "force", "--cycle", "20 Hz")
     assert "if the cycle" not in out
 
 
@@ -122,8 +124,8 @@ def test_simulated_series_are_read_back(tmp_path):
         assert verdict["nature"] == "undetermined"
         assert verdict["reason"].startswith("irregular beyond 1 N")
         assert verdict["tells_more"]
-    assert run("classify", "impact-beam", path, "--cycle", "27.5 Hz")[0] == 0
-    assert run("judge", "--load-rating", "500 N", path, "--cycle", "27.5 Hz")[0] == 0
+    assert run("classify", "impact-beam", path, "--read", "cycle=27.5 Hz")[0] == 0
+    assert run("judge", "--load-rating", "500 N", path, "--read", "cycle=27.5 Hz")[0] == 0
 
 
 @pytest.mark.parametrize(
@@ -139,15 +141,16 @@ def test_simulated_series_are_read_back(tmp_path):
             ("judge", "-", "--as", "peaks", "--cycle", "20 Hz"),
             "a cycle of 0.05 s is stated, which one",
         ),
-        (("judge", "-", "--tachometer", "1", "--cycle", "20 Hz"), "a tachometer and a cycle are stated"),
-        (("judge", "-", "--pulses-per-revolution", "2"), "allowed: with a tachometer"),
-        (("judge", "-", "--sensor-error", "1", "--sensor-sigma", "1"), "given twice"),
+        (("judge", "-", "--read", "tachometer=1", "--cycle", "20 Hz"), "a tachometer and a cycle are stated"),
+        (("judge", "-", "--read", "pulses-per-revolution=2"), "allowed: with a tachometer"),
+        (("judge", "-", "--sensor-error", "1", "--read", "sensor-sigma=1"), "given twice"),
+        (("judge", "-", "--read", "tachometr=1"), "--read has no key 'tachometr'; did you mean tachometer?"),
         (("classify", "impact-beam", "-", "--sensor-error", "nan"), "is no finite number"),
-        (("judge", "-", "--as", "series"), "no time column; use --rate-hz"),
+        (("judge", "-", "--as", "series"), "no time column; use --read rate-hz="),
         (("diagnose", "impact-beam", "--test", "mut", "--types"), "go with --test adaptive, not with mut"),
         (
             ("simulate", "impact-beam", "--clearance-mm", "0.1 furlong"),
-            "unknown unit 'furlong' (allowed: m, mm, um, in)",
+            "unknown unit 'furlong' (allowed: m, mm, um, in, mil, thou)",
         ),
         (("simulate", "impact-beam", "--set", "clearance=0.1 kg"), "unknown unit 'kg'"),
         (("simulate", "impact-beam", "--out", "peaks.xls"), "allowed: .csv, .parquet"),
@@ -206,19 +209,20 @@ def test_commands_of_the_documentation_run(tmp_path, monkeypatch):
     root = Path(__file__).parent.parent.parent
     page = (root / "docs" / "recordings.md").read_text()
     commands = [shlex.split(line)[1:] for line in re.findall(r"^    (chaosgym .*)$", page, re.MULTILINE)]
-    assert [command[0] for command in commands] == ["judge", "classify", "judge", "simulate", "judge", "fit"]
+    assert [command[0] for command in commands] == ["judge", "classify", "judge", "simulate", "judge", "judge", "fit"]
     monkeypatch.chdir(tmp_path)
     (tmp_path / "docs" / "data").mkdir(parents=True)
     for name in ("periodic.csv", "peaks.csv"):
         (tmp_path / "docs" / "data" / name).write_bytes((root / "docs" / "data" / name).read_bytes())
     sample = tmp_path / "docs" / "data" / "peaks.csv"
-    for command in commands[:3]:
+    for command in (*commands[:3], commands[4]):
         code, out, err = run(*command)
         assert code == 0, err
         assert "periodic, period 1" in out
-    assert (tmp_path / "report.html").is_file()
-    assert "together: random or chaotic, these sensors cannot tell" in run(*commands[4])[1]
-    told = re.search(r"agree; without noise their machines are chaotic (\d+)", run(*commands[5])[1])
+    assert "Life of the surface" in (tmp_path / "report.html").read_text()
+    assert "Life of the surface" not in (tmp_path / "recording.html").read_text()
+    assert "together: random or chaotic, these sensors cannot tell" in run(*commands[5])[1]
+    told = re.search(r"agree; without noise their machines are chaotic (\d+)", run(*commands[6])[1])
     assert told is not None
     assert int(told[1]) >= 90  # rounding decides about single records of chaos
     shipped = sample.read_text().splitlines()
@@ -250,21 +254,49 @@ def test_what_a_sweep_wrote_is_classified(tmp_path):
     assert answers["clearance"].to_pylist() == pq.read_table(tmp_path / "s" / "sweep.parquet")["clearance"].to_pylist()
 
 
-def test_a_coarse_sweep_calls_nothing_type_ii(tmp_path):
-    """Speeds 37 % apart are no neighbours: chaotic points are III, the others are left open, and that is said."""
-    axes = ("--axis", "clearance=0.1 mm:0.14 mm:2", "--axis", "excitation_frequency=4:30:4:log")
-    code, out, err = run("sweep", "impact-beam", *axes, "--budget", 100, "--out", tmp_path / "s", "--json")
+COARSE = ("--axis", "clearance=0.1 mm:0.14 mm:2", "--axis", "excitation_frequency=4:30:4:log")
+
+
+def test_a_coarse_sweep_types_its_points_by_runs_of_their_own(tmp_path):
+    """Speeds 37 % apart are no neighbours; eight points take seconds, so each is judged over its own tolerances."""
+    command = ("sweep", "impact-beam", *COARSE, "--budget", 100, "--out", tmp_path / "s", "--json")
+    code, out, err = run(*command)
+    assert code == 0, err
+    answer = json.loads(out)
+    assert "I" in answer["response_type"]
+    assert answer["calm"]["ranges"]
+    plan = json.loads((tmp_path / "s" / "plan.json").read_text())
+    assert plan["full_types"] == 1.0
+    again = run(*command)
+    assert again[:2] == (0, out)
+
+
+def test_a_coarse_sweep_without_types_calls_nothing_type_ii(tmp_path):
+    """Chaotic points are III, the others are left open, and that is said."""
+    command = (
+        "sweep",
+        "impact-beam",
+        *COARSE,
+        "--budget",
+        100,
+        "--label",
+        "full-types=0",
+        "--out",
+        tmp_path / "s",
+        "--json",
+    )
+    code, out, err = run(*command)
     assert code == 0, err
     answer = json.loads(out)
     assert set(answer["response_type"]) <= {"III", "undetermined"}
-    assert any("one tolerance apart" in warning for warning in answer["warnings"])
+    assert any("tolerances were not checked" in warning for warning in answer["warnings"])
 
 
 def test_a_design_tells_its_source_and_no_examples(tmp_path):
     """Without a strength there is no reliability; the file, its hash and the date are in the report."""
     path, page = tmp_path / "peaks.csv", tmp_path / "report.html"
     path.write_text("cycle,peak [N]\n" + "".join(f"{k},{50 + k % 2}\n" for k in range(60)))
-    code, out, err = run("judge", path, "--load-rating", "500", "--out", page)
+    code, out, err = run("judge", path, "--load-rating", "500", "--report", page)
     assert code == 0, err
     assert out.startswith("periodic, period 2: every cycle loads the surface alike")
     assert "no reliability" in out
@@ -296,7 +328,7 @@ def test_a_measured_sweep_is_told_by_types(tmp_path):
     ]
     assert (told["speed_column"], told["speed_unit"], len(told["speeds"])) == ("frequency", "Hz", 27)
     assert (tmp_path / "s.png").stat().st_size > 10_000
-    code, out, _ = run("judge-sweep", SWEEP, "--sensor-sigma", "1.73 N")
+    code, out, _ = run("judge-sweep", SWEEP, "--read", "sensor-sigma=1.73 N")
     assert code == 0
     assert "Type III  29 to 30 Hz" in out
 
@@ -342,9 +374,9 @@ def test_an_acceleration_is_judged_in_its_own_unit(tmp_path):
     assert "in mV, the readings are in g" in err
     code, _, err = run("judge", path, "--load-rating", "500 N")
     assert code == 2
-    assert "asks for a force; state --scale" in err
-    assert run("judge", path, "--load-rating", "500 N", "--scale", "0.02 g/N")[0] == 0
-    code, out, _ = run("judge", path, "--scale", "0.02 g/N")
+    assert "asks for a force; state --read scale='100 g/N'" in err
+    assert run("judge", path, "--load-rating", "500 N", "--read", "scale=0.02 g/N")[0] == 0
+    code, out, _ = run("judge", path, "--read", "scale=0.02 g/N")
     assert code == 0
     assert "mean 150.0" in out
     assert run("judge", path, "--plot", tmp_path / "g.png")[0] == 0
@@ -412,7 +444,7 @@ PEAKS = Path(__file__).parents[2] / "docs" / "data" / "peaks.csv"
     ("arguments", "message"),
     [
         (["impact-beam", PEAKS, "--column", "upper", "--estimate", "hue"], "'hue' can't be estimated"),
-        (["impact-beam", PEAKS, "--column", "upper", "--sensor-sigma", "-1"], "out of range"),
+        (["impact-beam", PEAKS, "--column", "upper", "--read", "sensor-sigma=-1"], "out of range"),
     ],
 )
 def test_a_record_beside_a_machine_is_refused_in_one_line(arguments, message):

@@ -61,8 +61,8 @@ def test_what_is_no_stream_of_forces_ends_in_one_line():
     for arguments, message in (
         ((), "standard input holds no peak"),
         (("--timeout-s", "0"), "out of range"),
-        (("--unit", "g"), "the monitor asks for forces"),
-        (("--sensor-error", "0.1 g"), "unknown unit 'g'"),
+        (("--read", "unit=g"), "the monitor asks for forces"),
+        (("--sensor-error", "0.1 g"), "error is in g, the readings are in N"),
     ):
         code, out, err = run("monitor", *arguments)
         assert (code, out) == (2, "")

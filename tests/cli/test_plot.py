@@ -1,15 +1,25 @@
 """Pictures of what commands found: ``--plot`` draws one, and never writes over what the user did not name."""
 
 import json
+import re
 from pathlib import Path
+from types import SimpleNamespace
 
 import numpy as np
+import pyarrow as pa
 import pytest
 from click.testing import CliRunner
+from matplotlib.backends.backend_agg import FigureCanvasAgg
 from PIL import Image
 
+from chaosgym import ImpactBeam, read_machine
 from chaosgym.cli import app
 from chaosgym.errors import ChaosgymError
+from chaosgym.machines.machine_file import template
+from chaosgym.plotting.commands import measured_figure, thumbnails
+from chaosgym.plotting.labels import called
+from chaosgym.plotting.response import sweep_map
+from chaosgym.sweeps import Axis, LabelledSweep, SweepPlan
 from tests.control.made_up import ENV
 
 
@@ -78,6 +88,7 @@ def test_a_sweep_is_drawn_along_one_field_or_over_two(axes):
     assert len(text) > 5000
 
 
+@pytest.mark.filterwarnings("ignore:this policy does not know what was usual")
 def test_an_agent_is_drawn(folder):
     """The picture of a job, in a new file by its environment."""
     assert told("run-agent", ENV, "--policy", folder, "--plot")["plot"] == f"run-agent-{ENV.rpartition('/')[2]}.png"
@@ -106,3 +117,76 @@ def test_nothing_is_drawn_without_being_asked(here):
     """No file, and no entry in the answer."""
     assert "plot" not in told("simulate", "impact-beam", "--cycles", 2)
     assert list(here.iterdir()) == []
+
+
+def test_a_machine_is_called_by_the_title_of_its_file(tmp_path):
+    """A title says what the machine is; without one the file's name stands."""
+    text = template()
+    assert 'title = "' in text
+    titled, untitled = tmp_path / "a.toml", tmp_path / "press.toml"
+    titled.write_text(re.sub(r'^title = ".*"', 'title = "Feeder of line 3"', text, flags=re.MULTILINE))
+    untitled.write_text(re.sub(r"^title = .*\n", "", text, flags=re.MULTILINE))
+    assert called(read_machine(titled)) == "Feeder of line 3"
+    assert called(read_machine(untitled)) == "press"
+
+
+def test_the_legend_of_a_map_stays_within_it():
+    """Of a sweep with every nature and type: all of their names are in the picture."""
+    axes = Axis("excitation_frequency", 10.0, 20.0, count=4), Axis("clearance", 1e-4, 2e-4, count=2)
+    columns = {
+        "excitation_frequency": 2 * [10.0, 13.0, 16.0, 19.0],
+        "clearance": 4 * [1e-4] + 4 * [2e-4],
+        "nature": [
+            "periodic",
+            "quasiperiodic",
+            "chaotic",
+            "undetermined",
+            "periodic",
+            "periodic",
+            "chaotic",
+            "chaotic",
+        ],
+        "response_type": 2 * ["I", "II", "III", "undetermined"],
+    }
+    plan = SweepPlan(ImpactBeam(), axes)
+    figure = sweep_map(LabelledSweep(pa.table(columns), plan.settings()))
+    canvas = FigureCanvasAgg(figure)
+    canvas.draw()
+    (legend,) = figure.legends
+    extent = legend.get_window_extent(canvas.get_renderer())
+    assert len(legend.get_texts()) == 8
+    assert "quasiperiodic" in [text.get_text() for text in legend.get_texts()]
+    assert 0.0 <= extent.x0 < extent.x1 <= figure.bbox.x1
+
+
+def test_headings_of_small_pictures_stay_above_their_own():
+    """A long verdict is broken into lines, and the end of a long name of a file is kept."""
+    words = "periodic, period 1, if its scatter of 0.77 % is random"
+    verdict = SimpleNamespace(nature="periodic", words=words)
+    figure = thumbnails([("a-very-long-name-of-a-file-of-line-3.csv, peak", np.ones(9), verdict)] * 3)
+    canvas = FigureCanvasAgg(figure)
+    canvas.draw()
+    ends = [ax.get_tightbbox(canvas.get_renderer()).x1 for ax in figure.axes]
+    assert all(end < ax.bbox.x0 for end, ax in zip(ends[:-1], figure.axes[1:], strict=True))
+    assert ends[-1] < figure.bbox.x1
+    assert words in figure.axes[0].get_title("left").replace("\n", " ")
+
+
+def test_a_title_is_broken_where_the_picture_ends():
+    """A long name with a long verdict is whole."""
+    headline = "periodic, period 1, if its scatter of 0.77 % is random (margin 0.29)"
+    statement = SimpleNamespace(headline=headline)
+    verdict = SimpleNamespace(diagnosis=SimpleNamespace(nature="periodic", statement=statement))
+    figure = measured_figure(
+        SimpleNamespace(
+            verdict=verdict,
+            peaks=np.arange(9.0),
+            unit="N",
+            title="vibration of the left bearing of pump 3 in January, " * 2,
+        )
+    )
+    canvas = FigureCanvasAgg(figure)
+    canvas.draw()
+    (title,) = [text for text in figure.texts if text.get_text()]
+    assert title.get_window_extent(canvas.get_renderer()).x1 <= figure.bbox.x1
+    assert headline in title.get_text().replace("\n", " ")

@@ -5,6 +5,7 @@ import pyarrow as pa
 import pyarrow.compute
 import pytest
 from stable_baselines3 import PPO
+from stable_baselines3.common.vec_env import VecNormalize
 
 import chaosgym
 from chaosgym.control import comparison
@@ -12,7 +13,8 @@ from chaosgym.control.comparison import LOAD, compare, joined, read_comparison
 from chaosgym.control.controllers import BackOff, Follow
 from chaosgym.control.evaluation import policy_of
 from chaosgym.control.maps import model_keywords
-from chaosgym.control.policies import TrainedPolicy
+from chaosgym.control.policies import TrainedPolicy, save_policy
+from chaosgym.control.policies.export import exported
 from chaosgym.control.policies.network import Dense, Network
 from chaosgym.control.rollout import play
 from chaosgym.control.scores import ONE, ZERO, Scores, table_lines
@@ -84,7 +86,9 @@ def test_there_are_no_more_machines_than_are_kept(tmp_path):
     """256 of development and 512 sealed ones; a level, a split and a seal are part of what a file is of."""
     out = tmp_path / "beam.parquet"
     for sealed, kept in ((False, 256), (True, 512)):
-        with pytest.raises(ParameterError, match=f"machines = {kept + 1} is out of range; allowed: up to {kept}"):
+        with pytest.raises(
+            ParameterError, match=f"machines = {kept + 1} is out of range; allowed: whole numbers from 1 to {kept}"
+        ):
             compare(BEAM, out, machines=kept + 1, only=[ZERO], sealed=sealed)
     compare(BEAM, out, machines=2, only=[ZERO], level="fleet", split="test", sealed=True)
     read_comparison(out, f"{BEAM}, level fleet, split test, sealed True")
@@ -142,6 +146,21 @@ def test_evaluation_of_a_model_is_that_of_its_file(tmp_path):
     first, second = (chaosgym.evaluate(given, BEAM, machines=2) for given in (model, tmp_path / "model.zip"))
     assert first.mean_return == second.mean_return
     assert first.interval[0] <= first.score <= first.interval[1]
+
+
+def test_a_file_whose_statistics_are_missing_is_refused(tmp_path):
+    """Readings of 95 N where the network saw numbers around 0 would be scored as if it had learned nothing."""
+    envs = VecNormalize(SB3VecEnv(BEAM, 2, steps=6))
+    model = PPO("MlpPolicy", envs, n_steps=6, batch_size=12, device="cpu", seed=0).learn(12)
+    model.save(tmp_path / "model.zip")
+    envs.save(str(tmp_path / "statistics.pkl"))
+    with pytest.raises(ModelFileError, match="trained behind VecNormalize, whose statistics are missing"):
+        policy_of(tmp_path / "model.zip")
+    again = VecNormalize.load(str(tmp_path / "statistics.pkl"), SB3VecEnv(BEAM, 2, steps=6))
+    save_policy(exported(model, BEAM, envs), tmp_path / "new" / "folder")
+    given = (model, PPO.load(tmp_path / "model.zip", env=again, device="cpu"), tmp_path / "new" / "folder")
+    first, *others = (chaosgym.evaluate(each, BEAM, machines=2).mean_return for each in given)
+    assert others == pytest.approx([first, first])
 
 
 def test_what_is_no_policy_is_refused(tmp_path):

@@ -6,6 +6,7 @@ import pytest
 
 import chaosgym
 from chaosgym.control.controllers import BackOff, Follow, Kriging
+from chaosgym.control.guard import GuardedPolicy
 from chaosgym.control.policies import shipped_policy
 from chaosgym.errors import ModelFileError, ParameterError
 
@@ -30,7 +31,7 @@ def plant(envs):
     return seen
 
 
-@pytest.mark.parametrize("policy", [Follow(), BackOff(), Kriging(), shipped_policy(BEAM)])
+@pytest.mark.parametrize("policy", [Follow(), BackOff(), Kriging(), GuardedPolicy(shipped_policy(BEAM))])
 def test_speeds_are_those_of_the_environment(policy):
     """Forty steps with ideal sensors and a demand that changes: the same speeds to the last bit."""
     given = IDEAL | policy.keywords | {"steps": 40, "shortest_hold": 9, "longest_hold": 12}
@@ -70,8 +71,8 @@ def test_it_runs_for_longer_than_a_job():
         ([80.0] * 4, {}, r"peaks of shape \(4,\) are not usable; allowed: 5 or more forces"),
         ("loud", {}, "peaks = 'loud' are no numbers; allowed: 5 or more forces"),
         ([80.0, np.nan, -1.0] * 5, {}, "5 or more forces from 0 N on"),
-        ([80.0] * 10, {"demand": 99.0}, "demand = 99.0 is out of range; allowed: 10 to 24"),
-        ([80.0] * 10, {"bouncing": 2.0}, "bouncing = 2.0 is out of range; allowed: 0 to 1"),
+        ([80.0] * 10, {"demand": 99.0}, "demand = 99 is out of range; allowed: 10 to 24"),
+        ([80.0] * 10, {"bouncing": 2.0}, "bouncing = 2 is out of range; allowed: 0 to 1"),
     ],
 )
 def test_what_is_no_reading_is_refused(peaks, readings, complaint):
@@ -113,8 +114,9 @@ def test_what_is_no_reading_is_skipped(policy):
     assert operator.next(lost[3], **seen) == operator.demand
     assert operator.lost == 4
     assert operator.next(loud, **seen | {"impacts": np.nan}, demand=22.0) == 22.0
+    assert operator.next(loud, **seen | {"impacts": np.inf}) == 22.0
     assert np.isfinite(operator.next(loud, **seen))
-    assert operator.lost == 5
+    assert operator.lost == 6
 
 
 def test_the_longest_stretch_of_finite_peaks_is_the_reading():
@@ -166,3 +168,76 @@ def test_a_measured_speed_that_scatters_is_the_speed_that_was_set():
         )
     assert speeds[0] == speeds[1]
     assert len(set(speeds[0])) > 2
+
+
+def test_a_trained_policy_is_guarded_unless_it_is_not_to_be():
+    """Readings that no machine of training had: guarded, the demand is followed, and the operator says why."""
+    for guard in (True, False):
+        operator = chaosgym.Operator(shipped_policy(BEAM), BEAM, guard=guard)
+        operator.start(speed=20.0, demand=20.0)
+        strange = np.tile([150.0, 300.0, 220.0, 90.0], 3)[:10]
+        speeds = [operator.next(strange, impacts=2.0, bouncing=0.1) for _ in range(12)]
+        assert operator.foreign == (True if guard else None)
+        assert isinstance(operator.policy, GuardedPolicy) is guard
+        assert speeds[-1] == 20.0 or not guard
+
+
+def test_a_map_remembers_the_last_job_of_a_machine(tmp_path):
+    """What was felt is there again after the next start, with its file alone; without one it is dropped."""
+    file = tmp_path / "memory.npz"
+    readings = {"impacts": 2.0, "bouncing": 0.1}
+
+    def begun(policy="fleet", **keywords):
+        """An operator that was started."""
+        operator = chaosgym.Operator(shipped_policy(BEAM, policy), BEAM, guard=False, **keywords)
+        operator.start(speed=20.0, demand=20.0)
+        return operator
+
+    first = begun(memory=file)
+    for _ in range(4):
+        first.next(np.linspace(80.0, 90.0, 10), **readings)
+    felt = first.policy.memory
+    assert (felt[0, :, 0] > 0.0).sum() >= 1
+    assert not file.exists()
+    first.keep()
+    np.testing.assert_array_equal(begun(memory=file).policy.memory, felt)
+    assert not begun().policy.memory.any()
+    with pytest.raises(ModelFileError, match="is a memory of another policy"):
+        begun("clearance", memory=file)
+    file.write_bytes(b"no archive")
+    with pytest.raises(ModelFileError, match="can't be read as a memory"):
+        begun(memory=file)
+    with pytest.raises(ParameterError, match="Kriging keeps no memory from job to job; allowed: a learned map"):
+        chaosgym.Operator(Kriging(), BEAM, memory=file)
+
+
+class Away(BackOff):
+    """A controller that wants to be 1 Hz above the demand from the third step on."""
+
+    def speeds(self, observations):
+        """The demand, and then another speed."""
+        self.steps = getattr(self, "steps", 0) + 1
+        return observations[:, 1].astype(float) + (1.0 if self.steps > 2 else 0.0)
+
+
+@pytest.mark.parametrize(("largest", "stays"), [(150.0, True), (400.0, False)])
+def test_few_cycles_of_a_large_force_are_seen(largest, stays):
+    """One peak in ten that is large wears as the power of 10/3 says, though the mean peak is hardly larger."""
+    operator = chaosgym.Operator(Away(), BEAM)
+    speed = operator.start(speed=20.0, demand=20.0)
+    calm, few = np.full(10, 80.0), np.r_[np.full(9, 60.0), largest]
+    assert few.mean() < 1.2 * calm.mean()
+    load = np.mean(few ** (10 / 3)) ** 0.3 / 80.0
+    assert bool(load < 1.5) is stays
+    for _ in range(8):
+        speed = operator.next(calm if speed == 20.0 else few)
+    assert speed == (21.0 if stays else 20.0)
+
+
+def test_a_task_without_damage_allows_any_force():
+    """Where life costs nothing, a speed of larger force is as good as another."""
+    operator = chaosgym.Operator(Away(), BEAM, damage_weight=0.0)
+    speed = operator.start(speed=20.0, demand=20.0)
+    for _ in range(8):
+        speed = operator.next(np.full(10, 80.0 if speed == 20.0 else 400.0))
+    assert speed == 21.0

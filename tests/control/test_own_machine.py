@@ -14,6 +14,7 @@ from stable_baselines3.common.vec_env import VecNormalize
 import chaosgym
 from chaosgym.control.comparison import compare
 from chaosgym.control.controllers import Follow
+from chaosgym.control.evaluation import Evaluation
 from chaosgym.control.policies import load_policy, save_policy
 from chaosgym.control.policies.checkpoint import load_checkpoint, save_checkpoint
 from chaosgym.control.policies.export import exported
@@ -145,3 +146,9 @@ def test_a_script_trains_on_a_file_and_goes_on(machine_file, tmp_path):
         assert done.returncode == 0, done.stderr
     assert len((out / "progress.csv").read_text().splitlines()) >= 3
     assert play(load_policy(out), str(machine_file), range(2)).returns.max() < 0.0
+
+
+def test_an_evaluation_prints_as_one_line():
+    """What a notebook shows is the score, not the arrays of every job."""
+    result = Evaluation(0.256, (0.14, 0.36), -19.6, 0.07, 1.234, played=None)  # type: ignore[arg-type]
+    assert repr(result) == "<score 0.26 (0.14 to 0.36), return -19.60, Type III 7.0%, 1.23 off the demand>"

@@ -10,9 +10,10 @@ import pytest
 
 import chaosgym
 from chaosgym.control.controllers import BackOff, Follow, Kriging
-from chaosgym.control.plant import PlantError, plant_of, work
+from chaosgym.control.plant import Interrupted, PlantError, work
 from chaosgym.control.policies import shipped_policy
 from chaosgym.errors import ParameterError
+from chaosgym.plants.plant import plant_of
 from tests.cli.run import run
 from tests.control.foreign_plants import Bilinear, GearPair
 
@@ -107,6 +108,7 @@ def test_damage_is_that_of_the_peaks():
         ("return 'loud'", "failed: ValueError"),
         ("return None", r"returned peaks of shape \(\)"),
         ("raise OSError('no answer')", "plant broken failed: OSError: no answer"),
+        ("raise SystemExit(3)", "plant broken failed: SystemExit: 3"),
     ],
 )
 def test_what_is_no_reading_is_refused(body, complaint):
@@ -161,6 +163,19 @@ def test_foreign_plants_are_played(kind, policy):
     assert np.abs(np.diff(done.speed)).max() <= operator.task.slew_limit
 
 
+def test_a_gear_pair_may_be_left_in_a_worse_motion():
+    """Two motions at one speed: after backing off the demand is held in the other one, and a third of the life is left.
+
+    No controller that goes by measurements can know that before; the page on machines says so.
+    """
+    backed, followed = (work(GearPair(), chaosgym.Operator(policy, BEAM)) for policy in (BackOff(), Follow()))
+    same = backed.speed[80:110] == followed.speed[80:110]
+    assert same.all()
+    assert followed.mean_peak[80:110].max() < 75.0
+    assert backed.mean_peak[80:110].max() < 75.0
+    assert followed.damage / backed.damage == pytest.approx(0.33, abs=0.03)
+
+
 def test_signed_forces_wear_each_stop():
     """The largest and the smallest force of a cycle are those of two stops; the damage is that of the worse one."""
 
@@ -206,12 +221,12 @@ def test_a_plant_is_stopped_whatever_happens(error):
         return run_well(speed, cycles)
 
     plant.run = fail
-    with pytest.raises((PlantError, KeyboardInterrupt)) as told:
+    with pytest.raises((PlantError, Interrupted)) as told:
         work(plant, operator, name="mine")
     assert plant.stops == 2
-    if isinstance(told.value, PlantError):
-        assert str(told.value) == "plant mine failed: OSError: no answer (step 4 of 12, cycles 19 to 24)"
-        assert told.value.worked.speed.tolist() == calls[1:4]
+    assert told.value.worked.speed.tolist() == calls[1:4]
+    line = "plant mine failed: OSError: no answer (step 4 of 12, cycles 19 to 24)"
+    assert str(told.value) == (line if isinstance(error, OSError) else "Ctrl-C")
 
 
 def test_an_error_of_stop_hides_none():
@@ -312,3 +327,26 @@ def test_arguments_reach_the_class(tmp_path, monkeypatch):
     assert "plant mine:Rig failed: TypeError" in err
     assert "allowed: NAME=VALUE" in run(*COMMAND, "mine:Rig", "--plant-arg", "gain")[2]
     assert "give --plant" in run("run-agent", BEAM, "--plant-arg", "gain=2")[2]
+
+
+def test_done_is_said_before_a_plant_is_played():
+    """A policy that can't be read: the program hears ``done`` and nothing else."""
+    code, out, err = run(*COMMAND, "-", "--policy", EXAMPLES)
+    assert (code, out) == (2, "done\n")
+    assert "policy.json" in err
+
+
+def test_a_failure_in_the_second_job_counts_its_own_steps(tmp_path, monkeypatch):
+    """The whole first job is told, and of the second one that no step was played."""
+    (tmp_path / "brake.py").write_text(
+        "class Rig:\n"
+        " resets = 0\n"
+        " def reset(self): Rig.resets += 1; assert Rig.resets < 2, 'the brake is on'\n"
+        " def run(self, speed, cycles): return [80.0] * cycles\n"
+    )
+    monkeypatch.chdir(tmp_path)
+    code, out, err = run(*COMMAND, "brake:Rig", "--json")
+    assert code == 2
+    assert "the brake is on; 0 steps of the job following the demand were played" in err
+    assert len(json.loads(out)["speed"]) == 120
+    assert json.loads(out)["follow"] is None

@@ -13,6 +13,8 @@ from chaosgym.machines.machine_file import template
 from tests.cli.run import run, run_json
 from tests.control.made_up import ENV
 
+pytestmark = pytest.mark.filterwarnings("ignore:this policy does not know what was usual")
+
 
 def test_a_job_among_many_is_the_job_alone():
     """A machine's job does not depend on those beside it: taken from two it is the one that is played alone."""
@@ -95,6 +97,7 @@ def test_kriging_plays_where_no_policy_is_shipped(tmp_path):
         (("CartPole-v1",), "is unknown"),
         (("gone.toml", "--policy", "{folder}"), "gone.toml can't be read"),
         ((ENV, "--policy", "nowhere"), "nowhere holds no policy.json"),
+        ((ENV, "--memory", "memory.npz"), "--memory is of one plant; give --plant MODULE:CLASS or --fmu FILE too"),
         (
             (ENV, "--plot", "job.tex"),
             "job.tex is no name of a picture; allowed: names that end in .png, .svg, .pdf, .gif, .mp4",

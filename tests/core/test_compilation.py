@@ -4,8 +4,8 @@ import os
 import shutil
 import subprocess
 import sys
-import time
 from pathlib import Path
+from typing import ClassVar
 
 import pytest
 from filelock import FileLock
@@ -13,23 +13,23 @@ from numba import types
 
 import chaosgym
 from chaosgym.core import compilation
-from chaosgym.core.compilation import is_cached
-from chaosgym.core.events import judge
 from chaosgym.core.joints.cycle import advance_joints
+from chaosgym.core.kernel_cache import ROOT, SHIPPED, kernel_digest, place_of
 from chaosgym.machines import ImpactBeam, SliderCrank
 from chaosgym.simulation import RungeKutta4, simulate
 
 COUNT = "; print(sum(kernel.stats.cache_misses.values()), sum(kernel.stats.cache_hits.values()))"
 REVOLUTION = (
     "from chaosgym.core.compilation import call; from chaosgym.core.motor import revolution as kernel;"
-    "import numpy as np; ones = np.ones(8); stopped, rate, *_ = call(kernel, ones, ones, ones, 1.0, 3.0, 1.0);"
+    "import numpy as np; ones = np.ones(8); line = np.array([0.0, 3.0]);"
+    "stopped, rate, *_ = call(kernel, ones, ones, ones, line[::-1].copy(), line, 3.0, 1.0);"
 )
 """Speed of a crank after a revolution under its motor: by one kernel, compiled in a fraction of a second."""
 ONE_KERNEL = REVOLUTION + COUNT.removeprefix("; ")
 ANSWER = REVOLUTION + "print(rate)"
 ACCELERATION = (
     "from chaosgym.core.compilation import call; from chaosgym.core.joints.tables import Rubs, read_at_rest;"
-    "import numpy as np; ones = np.ones((4, 1)); rubs = Rubs(ones[0], ones[:1], ones[:2], np.eye(2), ones[0]);"
+    "import numpy as np; ones = np.ones((4, 1)); rubs = Rubs(np.zeros(1), ones[:1], ones[:2], np.eye(2), ones[0]);"
     "print(call(read_at_rest, ones, np.ones((2, 2)), ones[:1], ones[0], rubs, 0, 0.0, 0.0, np.ones(2)))"
 )
 """What a joint reads, by a kernel that takes the derivative of a row from another file."""
@@ -45,9 +45,8 @@ def test_a_call_adds_no_version_of_a_kernel():
         "simulate(ImpactBeam(), 1, integrator=RungeKutta4(4000));"
         "print(len(advance_joints.signatures), len(advance_fixed_step.signatures))"
     )
-    out, err = _in_a_process(code).communicate()
+    out, err = _in_a_process(code, CHAOSGYM_KERNELS="").communicate()
     assert out.decode().split() == ["1", "1"], err.decode()
-    assert is_cached(advance_joints)
 
 
 def test_the_functions_that_are_counted_are_those_that_are_compiled():
@@ -59,13 +58,30 @@ def test_the_functions_that_are_counted_are_those_that_are_compiled():
     functions = {one for one in compilation._functions_of(advance_joints) if "friction" not in one.py_func.__module__}
     assert advance_joints in functions
     assert len(functions) > 10
-    assert all(map(is_cached, functions))
+    for one in functions:
+        place = place_of(Path(one.py_func.__code__.co_filename))
+        folders = [Path(root, place) for root in (SHIPPED, ROOT)]
+        assert any(list(folder.glob(f"{compilation.name_of(one)}-*.nbi")) for folder in folders), one
 
 
-def test_a_kernel_that_kernels_alone_call_refuses_python():
-    """It has nothing that takes arguments over from Python: without a refusal the process would crash."""
-    with pytest.raises(TypeError, match="judge is called by kernels alone"):
-        judge(1.0, 0.01, 0.0, 0.01, 0.0, 0.0)
+class _Slow:
+    """A kernel that nothing has compiled."""
+
+    targetoptions: ClassVar = {}
+
+    def __init__(self, function):
+        self.py_func, self.compile = function, lambda _: None
+
+
+def test_one_line_says_what_takes_so_long(monkeypatch, caplog):
+    """Of several kernels that are compiled in a process the first alone is named, with the reason."""
+    monkeypatch.setattr(compilation, "_loaded", lambda *_: False)
+    compilation._reason.cache_clear()
+    for kernel in (_Slow(lambda one: one), _Slow(lambda one: -one)):
+        compilation.prepare(kernel, 1.0)
+    (said,) = caplog.messages
+    assert "<lambda>: 1 functions, and others as they are called" in said
+    assert "once on this computer: " in said
 
 
 def test_no_kernel_gives_python_a_named_tuple():
@@ -80,9 +96,9 @@ def test_no_kernel_gives_python_a_named_tuple():
 
 
 def _in_a_process(code, **environment):
-    return subprocess.Popen(
-        [sys.executable, "-c", code], env={**os.environ, **environment}, stdout=subprocess.PIPE, stderr=subprocess.PIPE
-    )
+    """A process that compiles what it calls, and so uses nothing that is shipped."""
+    environment, pipe = {**os.environ, "CHAOSGYM_KERNELS": "none", **environment}, subprocess.PIPE
+    return subprocess.Popen([sys.executable, "-c", code], env=environment, stdout=pipe, stderr=pipe)
 
 
 @pytest.mark.slow
@@ -95,78 +111,12 @@ def test_processes_that_start_together_compile_once(tmp_path):
     assert sorted(err.decode().count("compiling motor.revolution") for _, err in ended) == [0, 1]
 
 
-BESIDE = (
-    "from chaosgym import *; from chaosgym.core import compilation;"
-    "compilation.numba.config.NUMBA_DEFAULT_NUM_THREADS = 2;"
-    "print(simulate(ImpactBeam(n_modes=1, fitted_modes=0), 3).peak_force.max());"
-    "from chaosgym.core.joints.cycle import advance_joints as kernel" + COUNT
-)
-
-
-@pytest.mark.slow
-def test_on_two_processors_another_process_compiles_what_moves_a_beam(tmp_path):
-    """It compiles just what this one then loads: the peak force is that of kernels compiled here, to the last bit."""
-    out, _ = _in_a_process(BESIDE, NUMBA_CACHE_DIR=str(tmp_path)).communicate()
-    force, missed, loaded = out.decode().split()
-    assert float(force) == simulate(ImpactBeam(n_modes=1, fitted_modes=0), 3).peak_force.max()
-    assert (missed, loaded) == ("0", "1")
-
-
-def test_on_one_processor_no_other_process_compiles(tmp_path):
-    """There it would only take turns with this one. Where one does, the pipe to it is closed when it ends."""
-    code = (
-        "from chaosgym.core import compilation; from chaosgym.core.motor import revolution, round_speeds;"
-        "compilation.numba.config.NUMBA_DEFAULT_NUM_THREADS = {};"
-        "compilation.compile_beside(revolution, round_speeds, '');"
-        "print(compilation._beside[revolution] is not None); compilation._take_over(revolution, 1)"
-    )
-    environment = {"NUMBA_CACHE_DIR": str(tmp_path), "PYTHONWARNINGS": "always::ResourceWarning"}
-    begun = [_in_a_process(code.format(count), **environment) for count in (1, 2)]
-    ended = [process.communicate() for process in begun]
-    assert [out.decode().strip() for out, _ in ended] == ["False", "True"]
-    assert not any(b"ResourceWarning" in err for _, err in ended)
-
-
-@pytest.mark.slow
-def test_where_another_process_compiles_nothing_this_one_does(tmp_path):
-    """A process that fails costs no answer, and leaves no folder."""
-    code = (
-        "from chaosgym.core import compilation; from chaosgym.core.motor import round_speeds as kernel;"
-        "from chaosgym.core.modal_impact import tabulate; import numpy as np;"
-        "compilation.numba.config.NUMBA_DEFAULT_NUM_THREADS = 2;"
-        "compilation.compile_beside(kernel, tabulate, 'raise SystemExit(1)');"
-        "folder = compilation._beside[kernel].folder; speeds = np.array([[1.0 + 2**-50]]);"
-        "compilation.call(kernel, speeds); import os; print(os.path.exists(folder))" + COUNT
-    )
-    out, _ = _in_a_process(code, NUMBA_CACHE_DIR=str(tmp_path)).communicate()
-    assert out.decode().split() == ["False", "1", "0"]
-
-
-def test_a_process_that_compiles_beside_ends_with_the_one_that_started_it(tmp_path):
-    """Killed, that one can end nothing itself: no process and no folder stay."""
-    code = (
-        "from chaosgym.core import compilation; from chaosgym.core.motor import round_speeds as kernel;"
-        "from chaosgym.core.modal_impact import tabulate; import time;"
-        "compilation.numba.config.NUMBA_DEFAULT_NUM_THREADS = 2;"
-        "compilation.compile_beside(kernel, tabulate, 'import time; time.sleep(600)');"
-        "print(compilation._beside[kernel].folder, flush=True); time.sleep(600)"
-    )
-    process = _in_a_process(code, NUMBA_CACHE_DIR=str(tmp_path))
-    folder = Path(process.stdout.readline().decode().strip())
-    assert folder.exists()
-    process.kill()
-    process.communicate()
-    ends = time.monotonic() + 60.0
-    while folder.exists() and time.monotonic() < ends:
-        time.sleep(0.1)
-    assert not folder.exists()
-
-
 def test_what_is_compiled_already_waits_for_no_one():
     """While another process holds the lock, a kernel that lies on the disk is loaded at once."""
     simulate(ImpactBeam(), 1)
     with FileLock(compilation._lock_file()):
-        process = _in_a_process("from chaosgym import *; simulate(ImpactBeam(), 1); print('done')")
+        code = "from chaosgym import *; simulate(ImpactBeam(), 1); print('done')"
+        process = _in_a_process(code, CHAOSGYM_KERNELS="")
         out, err = process.communicate(timeout=120)
     assert (out.decode().strip(), err.decode()) == ("done", "")
 
@@ -225,7 +175,7 @@ def compiled(tmp_path_factory):
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize(("ending", "damage"), [("nbi", "empty"), ("nbi", "half"), ("nbc", "bit")])
+@pytest.mark.parametrize(("ending", "damage"), [("nbi", "empty"), ("nbi", "half"), ("nbc", "bit"), ("nbc", "empty")])
 def test_damaged_machine_code_is_compiled_anew(tmp_path, compiled, ending, damage):
     """An index that is empty or cut, or code with one bit flipped, is named in a line, and the answer is right."""
     intact, right = compiled
@@ -241,6 +191,39 @@ def test_damaged_machine_code_is_compiled_anew(tmp_path, compiled, ending, damag
     assert again == right
     assert "made anew" in said
     assert _answer(cache) == (right, "")
+
+
+def _first_diagnosis(**environment):
+    """What `diagnose` of a beam writes to standard error in a fresh account, and what it compiles into its cache."""
+    code = "from chaosgym import *; print(diagnose(ImpactBeam(excitation_frequency=19.0)).nature)"
+    out, err = _in_a_process(code, **environment).communicate()
+    assert out.decode().strip() == "periodic", err.decode()
+    return err.decode()
+
+
+@pytest.mark.skipif(not (SHIPPED / kernel_digest()).exists(), reason="`python -m chaosgym.kernels` has not been run")
+def test_the_first_diagnosis_of_an_account_compiles_nothing(tmp_path):
+    """Machine code comes with the package, also for a processor of another name than the one it was compiled on."""
+    fresh = {"CHAOSGYM_KERNELS": "", "NUMBA_CACHE_DIR": "", "HOME": str(tmp_path), "XDG_CACHE_HOME": ""}
+    assert _first_diagnosis(**fresh) == ""
+    assert _first_diagnosis(**fresh, NUMBA_CPU_NAME="haswell") == ""
+    assert not list(tmp_path.rglob("*.nbc"))
+
+
+@pytest.mark.slow
+def test_machine_code_of_another_numba_is_not_used(tmp_path):
+    """Sources copied with the machine code of another version compile their own, and a line says why."""
+    package = tmp_path / "chaosgym"
+    shutil.copytree(Path(chaosgym.__file__).parent, package, ignore=shutil.ignore_patterns("__pycache__", "weights"))
+    made_for = package / "compiled" / "made-for.txt"
+    made_for.write_text("numba 0.1, Python 3.11, x86-64-v3")
+    for folder in made_for.parent.iterdir():
+        if folder.is_dir():
+            folder.rename(folder.with_name(f"other-{folder.name}"))
+    environment = {"CHAOSGYM_KERNELS": "", "NUMBA_CACHE_DIR": str(tmp_path / "cache"), "PYTHONPATH": str(tmp_path)}
+    out, err = _in_a_process(ANSWER, **environment).communicate()
+    assert float(out) > 0.0
+    assert "once on this computer: the package has machine code for numba 0.1" in err.decode()
 
 
 @pytest.mark.slow

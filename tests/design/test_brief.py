@@ -1,6 +1,7 @@
 """Design briefs: what is written is what is assessed, and every mistake is named with its cure."""
 
 import tomllib
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -30,7 +31,8 @@ def test_template_of_every_machine_describes_the_machine_of_the_thesis(name, tmp
     path = tmp_path / "brief.toml"
     path.write_text(template(name))
     found = read_brief(path)
-    assert found.machine == MACHINES[name]()
+    assert with_model(found.machine, MACHINES[name]()) == MACHINES[name]()
+    assert found.accuracy.error <= found.accuracy.tolerance == 0.01 or "no model within 1 %" in found.accuracy.warning
     assert found.region.keys() == default_tolerances(found.machine).keys()
     for field, tolerance in default_tolerances(found.machine).items():
         assert found.region[field].value == pytest.approx(tolerance.value)
@@ -83,7 +85,8 @@ def test_quantities_are_read_with_and_without_a_space():
         ("[parametres]", "'parametres'; did you mean parameters?"),
         ("[parameters]\nclearance = 0.1", "has no unit; write parameters.clearance"),
         ("[parameters]\nclearance = '0.1'", "has no unit"),
-        ("[parameters]\nclearance = '0.1 mn'", "unknown unit 'mn' (allowed: m, mm, um, in)"),
+        ("[parameters]\nclearance = '0.1 MM'", "unknown unit 'MM'; did you mean mm? (allowed: m, mm"),
+        ("[parameters]\nclearance = '0.1 mn'", "unknown unit 'mn' (allowed: m, mm, um, in, mil, thou)"),
         ("[parameters]\nclearance = 'wide'", "does not begin with a number"),
         ("[parameters]\nclearance = '-1 mm'", "clearance = -0.001 m is out of range"),
         ("[parameters]\nclearance = [1, 2]", "is not a quantity"),
@@ -148,9 +151,31 @@ def test_too_few_cycles_are_marked_as_an_estimate():
     assert found.doubt in found.lines()
 
 
+def with_model(machine, other):
+    """The machine by the model of another."""
+    return replace(machine, **{name: getattr(other, name) for name in machine.model_fields})
+
+
 def test_default_machine_of_a_brief_is_the_one_of_the_thesis():
-    """Fields left out keep the value of the thesis."""
-    assert brief("").machine == ImpactBeam()
+    """Fields left out keep the value of the thesis, but those that make its model as accurate as is asked."""
+    assert with_model(brief("").machine, ImpactBeam()) == ImpactBeam()
+    assert brief("").accuracy.error <= 0.01
+    assert brief('fidelity = "standard"').machine == ImpactBeam()
+    assert brief("[parameters]\nn_modes = 5").machine == ImpactBeam(n_modes=5)
+
+
+def test_the_model_of_a_brief_serves_all_that_it_may_become():
+    """One model for the nominal machine and its farthest changes: the worst of them decides."""
+    soft = brief('[changes]\ncontact_stiffness = ["3 N/um"]\n[parameters]\nexcitation_frequency = "10 Hz"')
+    stiff = brief('[changes]\ncontact_stiffness = ["240 N/um"]\n[parameters]\nexcitation_frequency = "10 Hz"')
+    assert stiff.machine.n_modes > soft.machine.n_modes
+    assert stiff.accuracy.points == soft.accuracy.points > 1
+    rung = brief('fidelity = "standard"\n[changes]\ncontact_stiffness = ["240 N/um"]')
+    assert "the rung standard is documented to be within" in rung.accuracy.warning
+    with pytest.raises(ParameterError, match="fidelity = '1 %' chooses n_modes, and n_modes = 5"):
+        brief('fidelity = "1 %"\n[parameters]\nn_modes = 5')
+    with pytest.raises(ParameterError, match="fidelity = 'fast' is not one of standard, fine, reference"):
+        brief('fidelity = "fast"')
 
 
 @pytest.mark.parametrize(

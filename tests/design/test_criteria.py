@@ -14,7 +14,7 @@ from chaosgym.diagnosis import Tolerance
 from chaosgym.machines import ImpactBeam
 from chaosgym.plotting.commands import peaks_figure
 from chaosgym.plotting.comparison_report import comparison_report
-from chaosgym.plotting.design_report import design_report, measured_report
+from chaosgym.plotting.design_report import design_report
 from tests.cli.run import run
 
 CALM = ImpactBeam(excitation_frequency=10.0)
@@ -155,8 +155,6 @@ def test_a_recording_needs_no_load_rating():
     found = evaluate_peaks(peaks, Criteria())
     assert "life              not asked; state load_rating" in found.lines()
     assert found.as_dict()["evaluation"]["life"] is None
-    assert "Life: not asked; state a load rating." in measured_report(found)
     assert peaks_figure(found).get_suptitle() == f"Equivalent force {found.evaluation.force:.1f} N"
     rated = evaluate_peaks(peaks, Criteria(load_rating=500.0, stated={"load_rating": "--load-rating"}))
     assert "by a load rating of 500 N (--load-rating)" in "\n".join(rated.lines())
-    assert "<td>--load-rating</td>" in measured_report(rated)

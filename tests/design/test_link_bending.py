@@ -13,19 +13,20 @@ from chaosgym.design.study import study
 from chaosgym.errors import DesignError, ParameterError
 from chaosgym.machines.mechanism.beam import beam_link, fibre_stress
 from chaosgym.machines.mechanism.links import Beam
+from tests.machines.mechanisms import joint, surface
 
 LENGTH, CRANK, DIAMETER, MODULUS, DENSITY = 0.235, 0.05, 0.008, 2.1e11, 7850.0
 AREA, SECOND = math.pi * DIAMETER**2 / 4.0, math.pi * DIAMETER**4 / 64.0
 LINE = DENSITY * AREA
 
-MACHINE = """
+MACHINE = f"""
 title = "Slider crank whose rod bends"
 [ground]
-points = { shaft = "0, 0 mm" }
+points = {{ shaft = "0, 0 mm" }}
 gravity = "9.81 m/s^2"
 gravity_direction = "-90 deg"
 [link.crank]
-points = { shaft = "0, 0 mm", pin = "50, 0 mm" }
+points = {{ shaft = "0, 0 mm", pin = "50, 0 mm" }}
 [link.rod.beam]
 length = "235 mm"
 diameter = "8 mm"
@@ -34,29 +35,13 @@ density = "7850 kg/m^3"
 modes = 5
 damping_ratio = "5 %"
 [link.slider]
-points = { wrist = "0, 0 mm" }
+points = {{ wrist = "0, 0 mm" }}
 [[link.slider.body]]
 mass = "0.45 kg"
-[[joint]]
-name = "motor"
-kind = "revolute"
-between = ["ground.shaft", "crank.shaft"]
-driven = true
-[[joint]]
-name = "pin"
-kind = "revolute"
-between = ["crank.pin", "rod.start"]
-[[joint]]
-name = "wrist"
-kind = "revolute"
-between = ["rod.end", "slider.wrist"]
-[[joint]]
-name = "guide"
-kind = "prismatic"
-between = ["ground.shaft", "slider.wrist"]
-clearance = "0 mm"
-stiffness = "8 N/um"
-damping = "500 N s/m"
+{joint("motor", "revolute", "ground.shaft", "crank.shaft", "driven = true")}
+{joint("pin", "revolute", "crank.pin", "rod.start")}
+{joint("wrist", "revolute", "rod.end", "slider.wrist")}
+{joint("guide", "prismatic", "ground.shaft", "slider.wrist", surface("0 mm", "8 N/um", "500 N s/m"))}
 [operation]
 speed = "600 rpm"
 speed_range = "5 to 3000 rpm"
@@ -113,9 +98,9 @@ def test_the_stress_of_a_rod_is_moment_over_section_modulus(crank, speed, gravit
         chaosgym.read_machine(crank), {"speed": speed, "gravity_factor": gravity, "matrix_update_interval": 1.0}
     )
     theta = 2.0 * math.pi * np.arange(720) / 720
-    rows = machine.fibre_stress("rod", at, DIAMETER / 2.0)
+    rows = machine.bending_parts["rod"].stress(at, DIAMETER / 2.0)
     bent = 0.5 * (rows[0] - rows[1])
-    found = simulate(machine.showing(bent), 1, transient=6, samples_per_cycle=720).history[0, :, 0]
+    found = simulate(machine.bending_parts["rod"].showing(bent), 1, transient=6, samples_per_cycle=720).history[0, :, 0]
     expected = moment(speed, 9.81 * gravity, at, theta) * DIAMETER / 2.0 / SECOND
     largest = np.abs(expected).max()
     assert np.abs(found - expected).max() < miss * largest
@@ -137,8 +122,10 @@ def test_a_round_pin_without_gap_leaves_the_stress_as_it_is(crank):
     crank.write_text(text.replace("guide_stiffness", "wrist_stiffness"))
     machine = chaosgym.read_machine(crank).at(300.0)
     assert not machine.has_propagators
-    rows = machine.fibre_stress("rod", 0.1175, DIAMETER / 2.0)
-    found = simulate(machine.showing(0.5 * (rows[0] - rows[1])), 1, transient=6, samples_per_cycle=720).history[0, :, 0]
+    rows = machine.bending_parts["rod"].stress(0.1175, DIAMETER / 2.0)
+    found = simulate(
+        machine.bending_parts["rod"].showing(0.5 * (rows[0] - rows[1])), 1, transient=6, samples_per_cycle=720
+    ).history[0, :, 0]
     expected = moment(300.0, 9.81, 0.1175, 2.0 * math.pi * np.arange(720) / 720) * DIAMETER / 2.0 / SECOND
     assert np.abs(found - expected).max() < 0.005 * np.abs(expected).max()
 
@@ -160,8 +147,8 @@ def test_modes_of_a_pinned_beam_have_their_curvatures():
 def test_the_pull_of_a_rod_is_that_of_its_slider(crank):
     """Turned over dead centre at 600 rpm a slider of 0.45 kg pulls its rod by m r w^2 (1 + r / l), over its area."""
     machine = chaosgym.read_machine(crank)
-    pull = machine.fibre_stress("rod", 0.1, 0.0)[0]
-    found = simulate(machine.showing(pull), 1, transient=6, samples_per_cycle=720).history[0, 0, 0]
+    pull = machine.bending_parts["rod"].stress(0.1, 0.0)[0]
+    found = simulate(machine.bending_parts["rod"].showing(pull), 1, transient=6, samples_per_cycle=720).history[0, 0, 0]
     turn = 20.0 * math.pi
     carried = 0.45 + LINE * LENGTH / 2.0  # the outer half of the rod; the stretch is that of its middle
     assert found == pytest.approx(carried * CRANK * turn**2 * (1.0 + CRANK / LENGTH) / AREA, rel=0.05)

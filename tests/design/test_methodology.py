@@ -11,12 +11,13 @@ from chaosgym import read_machine
 from chaosgym.design import Criteria, assess, improve, variation_region
 from chaosgym.design.bearing import evaluate
 from chaosgym.design.changes import change_cost, default_changes
+from chaosgym.design.checks import Check
 from chaosgym.design.fatigue import equivalent_force, rating_life
-from chaosgym.design.improve import Trial, _rank
-from chaosgym.design.methodology import Check
+from chaosgym.design.improve import _rank
 from chaosgym.design.reliability import hertz_pressure, normal_reliability
 from chaosgym.design.runs import build_series, settled_run
-from chaosgym.design.trend import fit_trend
+from chaosgym.design.trends import fit_trend
+from chaosgym.design.trials import Trial
 from chaosgym.diagnosis import Tolerance
 from chaosgym.errors import ParameterError
 from chaosgym.machines import MACHINES, ImpactBeam

@@ -1,4 +1,4 @@
-"""The search for all motions of a machine: against long runs of other starts, other integrators and published cases."""
+"""The search for all motions of a machine: against long runs of other starts, and what is said of it."""
 
 import math
 import os
@@ -7,37 +7,29 @@ import numpy as np
 import pytest
 
 import chaosgym
-from benchmarks.published import no_separation
 from chaosgym.diagnosis import attractors, response_type
-from chaosgym.diagnosis.attractors import Mapper, most_unseen, share_of
+from chaosgym.diagnosis.attractors import most_unseen, share_of
 from chaosgym.diagnosis.carried import carried_states
+from chaosgym.diagnosis.push import smallest_push
 from chaosgym.diagnosis.shock import knock_words, smallest_shock
 from chaosgym.errors import DiagnosisError
-from tests.branches.test_branch import oscillator
-from tests.diagnosis.coexisting import energy_shells, is_among, other_motions, random_machine
+from tests.diagnosis.coexisting import (
+    energy_shells,
+    fresh_machine,
+    fresh_shells,
+    harder_machine,
+    is_among,
+    normal_states,
+    other_motions,
+    random_machine,
+    rotated_machine,
+    soft_stop,
+    trilinear,
+)
+from tests.diagnosis.machine_files import held_by_friction, written
 
-MULTISTABLE = int(os.environ.get("CHAOSGYM_MULTISTABLE", "3"))
+MULTISTABLE = int(os.environ.get("CHAOSGYM_MULTISTABLE", "6"))
 """Random machines with several motions on which the search is tried."""
-
-RATIO = 1.0 / (2.0 * math.pi)
-
-
-def trilinear(ratio):
-    """Between elastic stops five times as stiff as the spring, damping 4 %, at a multiple of its natural frequency."""
-    return oscillator(damping=0.04, stiffness=5.0, speed=ratio * RATIO, force=0.4)
-
-
-def soft_stop(ratio):
-    """One stop 29 times as stiff as the spring, damping 1 %, turned by an unbalance that grows with the square."""
-    return oscillator(
-        damping=0.01,
-        stiffness=29.0,
-        stops="one",
-        gap=1.26,
-        speed=ratio * RATIO,
-        force=0.7 * ratio**2,
-        angle=math.pi / 2.0,
-    )
 
 
 def test_bounds_of_shares_are_exact():
@@ -107,70 +99,46 @@ def test_what_is_said_tells_how_far_was_looked():
         attractors(beside, starts=-1)
 
 
-def test_chaos_beside_free_flight_takes_the_starts_of_an_own_integrator():
-    """De Souza, Wiercigroch, Caldas and Balthazar: an impact oscillator, chaotic or without contact, start by start.
+def test_a_torus_beside_free_flight_is_one_motion_and_no_type_i():
+    """From rest the machine never touches; most other starts end on a torus, which takes thousands of cycles to tell.
 
-    S. L. T. de Souza et al., Suppressing grazing chaos in impacting system by structural nonlinearity, Chaos Solitons
-    Fractals 38 (2008) 864-869: damping 0.02, force 0.5, ratio 0.417893, stop at 0.63 and 20 times as stiff.
+    While it is not told, its starts are unsettled, and a motion is not called safe beside them.
     """
-    ratio, count = 0.417893, 200
-    machine = oscillator(
-        damping=0.02, stiffness=20.0, stops="one", gap=0.63, speed=ratio * RATIO, force=0.5, angle=math.pi / 2.0
-    )
+    machine = rotated_machine(215)
     found = attractors(machine)
-    assert [(one.nature, one.largest_peak > 0.0) for one in found.motions] == [("chaotic", True), ("periodic", False)]
-    starts = np.random.default_rng(5).uniform(-1.0, 1.0, (count, 2))
-    place = np.array([-1 if one is None else one for one in Mapper(machine, found).reached(list(starts))])
-
-    def change(t, x, v):
-        return -0.04 * v - x - 20.0 * np.maximum(x - 0.63, 0.0) + 0.5 * np.cos(ratio * t)
-
-    steps, cycles = 500, 120
-    h, (x, v), largest = 2.0 * np.pi / ratio / steps, starts.T.copy(), np.full(count, -np.inf)
-    for step in range(steps * cycles):
-        t = h * (step % steps)
-        a1, b1 = v, change(t, x, v)
-        a2, b2 = v + 0.5 * h * b1, change(t + 0.5 * h, x + 0.5 * h * a1, v + 0.5 * h * b1)
-        a3, b3 = v + 0.5 * h * b2, change(t + 0.5 * h, x + 0.5 * h * a2, v + 0.5 * h * b2)
-        a4, b4 = v + h * b3, change(t + h, x + h * a3, v + h * b3)
-        x, v = x + h / 6.0 * (a1 + 2.0 * a2 + 2.0 * a3 + a4), v + h / 6.0 * (b1 + 2.0 * b2 + 2.0 * b3 + b4)
-        if step >= steps * (cycles - 4):
-            largest = np.maximum(largest, x)
-    assert np.mean((largest > 0.63) == (place == 0)) > 0.97
+    flight, torus = (one for one in found.motions if one.nature in ("periodic", "quasiperiodic"))
+    assert (flight.period, flight.largest_peak, torus.period) == (1, 0.0, None)
+    assert torus.random_starts > 24
+    judged = response_type(machine, window="speed-clearance", budget=800)
+    assert judged.type == "III"
+    unsure = response_type(machine, window="speed-clearance", budget=100)
+    assert unsure.type != "I"
 
 
-def test_the_two_motions_of_a_gear_pair_are_found():
-    """Kahraman and Singh: in the bent resonance the pair separates or not; not separating it is linear."""
-    gears = chaosgym.read_machine("docs/machines/kahraman-singh-1990.toml").at(740.0)
-    found = attractors(gears, carried=carried_states(gears))
-    assert [one.period for one in found.motions] == [1, 1]
-    peaks = sorted(one.largest_peak for one in found.motions)
-    assert peaks[0] == pytest.approx(float(no_separation(gears, np.array([740.0]))[0]), rel=1e-3)
-    assert peaks[1] > 2.0 * peaks[0]
-    assert {"run-up from 300 Hz", "run-down from 1600 Hz"} <= {way for one in found.motions for way in one.from_starts}
-    assert response_type(gears, window="speed-clearance", budget=400).type == "III"
+def test_orbits_that_long_chaos_ends_on_are_met():
+    """All random starts are chaotic for the whole budget; after thousands of cycles some end on period 1 or 5.
+
+    Newton's method reaches both from where the chaos nearly repeats; each is stable, so that a run from it stays.
+    """
+    machine = harder_machine(0)
+    chaos, *orbits = attractors(machine).motions
+    assert (chaos.nature, chaos.random_starts) == ("chaotic", 48)
+    assert sorted(one.period for one in orbits) == [1, 5]
+    assert ("near returns of a motion that does not repeat",) in [one.from_starts for one in orbits]
+    for one in orbits:
+        settled = chaosgym.simulate(machine, 10, one.state, transient=2000)
+        assert settled.peak_force.max() == pytest.approx(one.largest_peak, rel=1e-6)
 
 
 def test_neutral_motions_are_one_family(tmp_path):
     """Pressed together and held by friction, a machine rests wherever it stops: one family, not 48 motions.
 
-    Its multiplier is 1, and a rounding of the model decides whether a start on it is proven to stay. One that is not is
-    told as unsettled, and never as a motion of its own.
+    Its multiplier is 1, whatever a rounding of the model makes of its last digit.
     """
-    file = tmp_path / "held.toml"
-    file.write_text(
-        '[structure]\nfrequencies = "5, 20 Hz"\ndamping_ratios = 0.02\nmodal_masses = "1, 1 kg"\n'
-        '[structure.shapes]\nacross = "1, 0.2"\nalong = "0.1, 1"\n'
-        '[joint]\nat = "across"\nclearance = "0.1 mm"\nstops = "one"\nstiffness = "1 N/um"\n'
-        'damping = "100 N s/m"\npreload = "50 N"\nfriction = 0.9\ntangent = "along"\n'
-        '[[drive]]\nat = "along"\nforce = "1 N"\n'
-        '[operation]\nspeed = "9 Hz"\nspeed_range = "4 to 20 Hz"\nclearance_range = "0.05 to 0.3 mm"\n'
-    )
-    found = attractors(chaosgym.read_machine(file))
+    found = attractors(chaosgym.read_machine(written(tmp_path, held_by_friction("1 N"))))
     (held,) = found.motions
     assert held.neutral
-    assert held.random_starts >= 1
-    assert held.random_starts + found.unsettled == 48
+    assert (held.random_starts, found.unsettled) == (48, 0)
     assert "neutral" in held.words
 
 
@@ -193,12 +161,84 @@ def test_the_smallest_knock_leaves_and_a_smaller_one_does_not():
         assert settled.peak_force.max() == pytest.approx(peak, rel=1e-6)
 
 
-def multistable(count, most=1000):
-    """Random machines of which 200 starts from energy shells find several motions, each above 5 % of them."""
+def two_modes():
+    """A machine of two modes with a joint at its tip and a fan beside it, flying free beside a rattle."""
+    structure = chaosgym.Structure.of_modes([1.0, 2.6], 0.04, {"tip": [1.0, 0.6], "fan": [0.3, -0.5]})
+    return chaosgym.ModalMachine(
+        modes=structure,
+        joint="tip",
+        drives=(chaosgym.Drive.sine("force", "tip", 1.5e-2),),
+        speed=1.5,
+        clearance=1e-3,
+        contact_stiffness=200.0,
+        contact_damping=0.0,
+    )
+
+
+def test_a_knock_at_a_named_point_leaves():
+    """Knocks are tried at the joint and at the fan, by what energy each adds.
+
+    An impulse at a point changes the velocities by phi / |phi|^2 a unit of its own velocity, and no impulse that
+    gives the point this velocity takes less energy. One a percent above the smallest leaves, one below comes back.
+    """
+    machine = two_modes()
+    knocks = machine.kinematics.unit_knocks
+    assert set(knocks) == {"the joint", "point fan"}
+    assert machine.kinematics.places["point fan"] @ knocks["point fan"] == pytest.approx(1.0)
+    found = attractors(machine)
+    assert len(found.motions) > 1
+    shock = smallest_shock(machine, found, knocks=384)
+    assert shock.knock.at in knocks
+    begun = machine.section_at(shock.knock.phase)
+    there = found.motions[0].state
+    if shock.knock.phase:
+        there = chaosgym.simulate(machine.section_at(0.0, shock.knock.phase), 1, there).final_state.coordinates
+    peak = found.motions[0].largest_peak
+    for factor in (0.99, 1.01):
+        knocked = there.copy()
+        knocked[2:] += factor * shock.knock.velocity * knocks[shock.knock.at]
+        settled = chaosgym.simulate(begun, 4, knocked, transient=600)
+        assert (settled.peak_force.max() == pytest.approx(peak, rel=1e-3, abs=1e-9)) == (factor < 1.0)
+
+
+def test_the_least_push_takes_no_more_energy_than_the_least_knock():
+    """Of two modes any direction is tried: the least push leaves by longer runs of its own, one 2 % smaller does not.
+
+    Of 60 random directions at 0.8 of its size none leaves; a knock at the joint takes more energy.
+    """
+    machine = two_modes()
+    met = attractors(machine)
+    shock = smallest_shock(machine, met, knocks=384)
+    push = smallest_push(machine, met, shock, pushes=384)
+    assert 0.5 * sum(value**2 for value in push.change) == pytest.approx(push.energy)
+    for place, velocity in push.places.items():
+        assert velocity == pytest.approx(machine.kinematics.places[place] @ np.array(push.change))
+    by_knock = shock.knock.velocity * machine.kinematics.unit_knocks[shock.knock.at]
+    assert push.energy <= 0.5 * by_knock @ by_knock * (1.0 + 1e-9)
+    begun, there = machine.section_at(push.phase), met.motions[0].state
+    if push.phase:
+        there = chaosgym.simulate(machine.section_at(0.0, push.phase), 1, there).final_state.coordinates
+    peak = met.motions[0].largest_peak
+
+    def comes_back(change):
+        settled = chaosgym.simulate(begun, 4, there + np.append(np.zeros(2), change), transient=600)
+        return settled.peak_force.max() == pytest.approx(peak, rel=1e-3, abs=1e-9)
+
+    change = np.array(push.change)
+    assert not comes_back(1.001 * change)
+    assert comes_back(0.98 * change)
+    aside = np.random.default_rng(3).standard_normal((60, 2))
+    aside *= 0.8 * np.linalg.norm(change) / np.linalg.norm(aside, axis=1)[:, None]
+    assert all(comes_back(one) for one in aside)
+
+
+def multistable(count, machine_of, starts_of, most=1000):
+    """Random machines of which 200 starts of another kind find several motions, each above 5 % of them."""
     left = count
     for seed in range(most):
-        machine = random_machine(seed)
-        motions = other_motions(machine, energy_shells(machine, 200, seed))
+        machine = machine_of(seed)
+        starts = starts_of(machine, 200, seed)
+        motions = other_motions(machine, starts[::8]) and other_motions(machine, starts)
         if motions:
             yield machine, motions
             left -= 1
@@ -207,15 +247,27 @@ def multistable(count, most=1000):
 
 
 @pytest.mark.slow
-def test_motions_of_random_machines_are_not_missed():
+@pytest.mark.parametrize(
+    ("machine_of", "starts_of"),
+    [
+        (random_machine, energy_shells),
+        (rotated_machine, normal_states),
+        (harder_machine, energy_shells),
+        (fresh_machine, fresh_shells),
+    ],
+)
+def test_motions_of_random_machines_are_not_missed(machine_of, starts_of):
     """Of random machines with several motions at most one in ten has one that the search missed; none is of Type I."""
+    if machine_of is fresh_machine and MULTISTABLE < 24:
+        pytest.skip("of fewer than 24 one in ten is not told from one")
     missed = called_safe = 0
-    for machine, motions in multistable(MULTISTABLE):
+    for machine, motions in multistable(MULTISTABLE, machine_of, starts_of):
         found = attractors(machine, carried=carried_states(machine))
         missed += not all(is_among(one, found) for one in motions)
         judged = response_type(machine, window="speed-clearance", budget=800)
         peaks = [one.peak for one in motions if one.period]
         differ = len(peaks) < len(motions) or max(peaks) > 1.1 * min(peaks)
         called_safe += differ and judged.type == "I"
-    assert missed <= 0.1 * MULTISTABLE
+    print(f"{machine_of.__name__}: of {MULTISTABLE} machines with several motions {missed} have one that was missed")
     assert called_safe == 0
+    assert missed <= 0.1 * MULTISTABLE

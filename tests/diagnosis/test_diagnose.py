@@ -1,15 +1,20 @@
 import json
+import math
 
 import numpy as np
 import pytest
 
+import chaosgym
 from benchmarks.agreement import agreement, random_machines
 from chaosgym import Drive, ModalMachine, Structure
+from chaosgym.branches.margins import margins_of
 from chaosgym.diagnosis import diagnose
 from chaosgym.errors import DiagnosisError
 from chaosgym.machines import ImpactBeam, SliderCrank
 from chaosgym.machines.parameters import with_settings
+from chaosgym.series.verdict import escape_rate
 from chaosgym.simulation import RungeKutta4, simulate
+from tests.diagnosis.machine_files import DYING, NEARING, SOFT, held_by_friction, written
 from tests.plain_modes import PLAIN_BEAM
 
 
@@ -83,18 +88,98 @@ def test_chaos_of_the_beam_is_agreed():
     assert set(verdict.votes.values()) <= {"chaotic", "undetermined"}
 
 
-def test_transient_chaos_is_chaos_with_a_flag():
-    """A beam that is chaotic for some 76 cycles before it settles on period 3."""
+def test_the_nature_is_that_of_the_settled_motion():
+    """A beam that is chaotic for some 76 cycles, then of period 3; by the thesis' naming (5.2.3) it is chaotic."""
     fields = {"excitation_frequency": 27.2, "clearance": 0.158e-3, "damping_ratio": 0.028}
     verdict = diagnose(with_settings(PLAIN_BEAM, fields))
-    assert (verdict.nature, verdict.status, verdict.transient, verdict.period) == ("chaotic", "transient", True, 3)
+    assert (verdict.nature, verdict.status, verdict.period) == ("periodic", "certified", 3)
+    assert 50 < verdict.transient_chaos <= verdict.settle_cycle < verdict.horizon
+    assert verdict.words == f"periodic, period 3, after {verdict.transient_chaos} cycles of transient chaos"
+    label = verdict.labelled("thesis")
+    assert (label.nature, label.status, label.period, label.margin) == ("chaotic", "transient", 3, verdict.margin)
+    assert label.reason == f"transient chaos for {verdict.transient_chaos} cycles; then {verdict.reason}"
+    assert label.words == f"chaotic for {verdict.transient_chaos} cycles, then period 3"
+    assert verdict.labelled("settled") is verdict
+
+
+def test_a_motion_that_ends_without_contact_is_not_chaotic(tmp_path):
+    """Against a soft stop a mode rattles chaotically, then never touches again: its decay is that of its damping."""
+    machine = chaosgym.read_machine(written(tmp_path, SOFT)).at(speed=0.8)
+    starts = np.random.default_rng(3).uniform(-1.0, 1.0, (12, 2)) * [3e-3, 2e-2]
+    verdicts = [diagnose(machine, initial_state=start) for start in starts]
+    free = [one for one in verdicts if one.evidence["linear"] and one.transient_chaos]
+    assert free, "which of its motions chaos leaves it to hangs on rounding, but not for twelve starts"
+    for verdict in free:
+        assert verdict.nature == "periodic"
+        assert verdict.words == (
+            f"periodic, period 1, without contact, after {verdict.transient_chaos} cycles of transient chaos"
+        )
+        assert verdict.orbit.largest_multiplier == pytest.approx(math.exp(-0.01 * 2.0 * math.pi / 0.8), rel=1e-6)
+        later = chaosgym.simulate(machine, 100, verdict.run.final_state)
+        assert not later.peak_force.any()
+    assert margins_of(machine, free[0]).largest_multiplier == pytest.approx(free[0].orbit.largest_multiplier)
+
+
+def test_one_criterion_tells_transient_chaos_from_a_start(tmp_path):
+    """Chaos before an orbit that is proven while the motion still nears it counts as that before one that repeats.
+
+    Its orbit of period 7 attracts by a factor of 0.936 a period.
+    """
+    verdict = diagnose(chaosgym.read_machine(written(tmp_path, NEARING)))
+    assert (verdict.nature, verdict.period) == ("periodic", 7)
+    assert 50 < verdict.transient_chaos < verdict.settle_cycle
+    assert "of transient chaos" in verdict.words
+
+
+def test_chaos_is_told_for_at_least_the_cycles_that_were_seen():
+    """Without an escape in N cycles its rate is at most 3/N, the root of exp(-x N) = 0.05 to a part in 500."""
+    verdict = diagnose(ImpactBeam(), budget=400)
+    assert verdict.words == "chaotic for at least 400 cycles"
+    assert escape_rate(400) == pytest.approx(-math.log(0.05) / 400, rel=2e-3)
+    assert "at a rate of at most 7.5e-03 a cycle" in verdict.statement.horizon
+    assert "a budget of 1600 cycles" in verdict.statement.tells_more
+    longer = diagnose(ImpactBeam(), budget=1600)
+    assert verdict.margin == pytest.approx(math.log10(400 / 150) / 2.0)
+    assert longer.margin == pytest.approx(math.log10(1600 / 150) / 2.0)
+    assert verdict.labelled("thesis").margin == 1.0, "of the exponent alone"
+
+
+def test_chaos_that_dies_out_later_is_not_called_certain(tmp_path):
+    """One mode between two stops, driven by the third harmonic: chaotic for some 10,000 cycles, then periodic."""
+    machine = chaosgym.read_machine(written(tmp_path, DYING))
+    short = diagnose(machine, budget=400)
+    assert short.words == "chaotic for at least 400 cycles"
+    assert short.margin < 0.25
+    long = diagnose(machine, budget=51200)
+    assert (long.nature, long.status) == ("periodic", "certified")
+    assert long.transient_chaos > 400
+
+
+@pytest.mark.parametrize("force", ["1 N", "0 N"])
+def test_what_friction_holds_is_neutral(tmp_path, force):
+    """Pressed together and held by friction, a machine has a multiplier of 1: it stays where it is put, and is no more.
+
+    Without a drive it is at rest.
+    """
+    machine = chaosgym.read_machine(written(tmp_path, held_by_friction(force)))
+    verdict = diagnose(machine)
+    assert verdict.words == ("periodic, period 1, neutral" if force == "1 N" else "at rest under the load")
+    assert (verdict.status, verdict.nature) == ("agreed", "periodic")
+    assert verdict.orbit.neutral
+    assert not verdict.orbit.certified
+    assert abs(verdict.orbit.largest_multiplier - 1.0) < 1e-9
+    assert margins_of(machine, verdict) is None
+    beside = diagnose(machine, initial_state=np.asarray(verdict.evidence["final_state"]) * 1.001)
+    assert beside.orbit.neutral
+    assert np.max(np.abs(beside.orbit.state - verdict.orbit.state)) > 0.0, "another of the family"
 
 
 def test_a_long_period_is_proven_where_recurrence_does_not_look():
     """At 26.6 Hz a long transient locks on 34 cycles; at 28.6 Hz it settles on one cycle."""
     assert diagnose(PLAIN_BEAM.at(26.6), budget=1600).period == 34
-    slow = diagnose(PLAIN_BEAM.at(28.6), budget=1600)
-    assert (slow.period, slow.transient) == (1, True)
+    slow = diagnose(PLAIN_BEAM.at(28.6), budget=25600)
+    assert slow.period == 1
+    assert slow.transient_chaos > 50
 
 
 def test_chaos_within_the_sensor_error_counts_as_periodic_on_request():
@@ -119,7 +204,7 @@ def test_the_initial_state_is_part_of_the_label():
 
 def test_a_budget_below_the_first_stage_is_refused():
     """The error names the range."""
-    with pytest.raises(DiagnosisError, match="100 or more"):
+    with pytest.raises(DiagnosisError, match="whole numbers from 100 to"):
         diagnose(ImpactBeam(), budget=50)
 
 

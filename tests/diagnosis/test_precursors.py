@@ -60,11 +60,11 @@ def test_signs_of_a_periodic_response_say_how_often_they_are_right():
         ("period three", False),
         ("long bouncing", False),
     ]
-    assert all(sign.line.count("\n") == 0 and sign.line.endswith(" had it") for sign in signs)
+    assert all(sign.line.count("\n") == 0 and sign.line.endswith(" had this sign") for sign in signs)
     assert replace(signs[1], present=True, why="period 2").line.endswith(
-        "79% of the dataset's points with it had chaos within the tolerances of speed and clearance"
+        "79% of the dataset's points with this sign had chaos within the tolerances of speed and clearance"
     )
-    assert replace(signs[1], rate=None).line == "period doubling (5.3.2): no, period 1"
+    assert replace(signs[1], rate=None).line == "sign of chaos, period doubling: no, period 1"
     assert json.loads(json.dumps(signs[0].as_dict()))["rate"]["points"] > 10_000
 
 

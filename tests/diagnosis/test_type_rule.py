@@ -4,7 +4,15 @@ import numpy as np
 import pytest
 from scipy.optimize import linprog
 
-from chaosgym.diagnosis.type_rule import Coexisting, Neighbour, judge_type, mixed, type_of_cross, types_on_grid
+from chaosgym.diagnosis.type_rule import (
+    UNSETTLED,
+    Coexisting,
+    Neighbour,
+    judge_type,
+    mixed,
+    type_of_cross,
+    types_on_grid,
+)
 from chaosgym.errors import DiagnosisError
 
 CALM_THROUGHOUT = "periodic throughout the tolerances, peak force less than 10 % higher"
@@ -75,6 +83,20 @@ def motion(peak, nature="periodic"):
             (motion(100.0, "chaotic"),),
             "III",
             "another initial state leads to a chaotic motion, up to 100 N",
+        ),
+        (
+            "periodic",
+            CALM,
+            (motion(float("nan"), UNSETTLED),),
+            "undetermined",
+            "other initial states do not settle within the budget",
+        ),
+        (
+            "periodic",
+            CALM,
+            (motion(float("nan"), UNSETTLED), motion(111.0)),
+            "III",
+            "another initial state leads to 111 N instead of 100 N",
         ),
     ],
 )

@@ -61,7 +61,7 @@ def _judged(machine):
     json.dumps(verdict.as_dict(), allow_nan=False)
     assert verdict.nature in ("periodic", "quasiperiodic", "chaotic", "undetermined")
     assert 0.0 <= verdict.margin <= 1.0
-    assert (verdict.period is None) == (verdict.nature != "periodic") or verdict.transient
+    assert (verdict.period is None) == (verdict.nature != "periodic")
     return verdict
 
 

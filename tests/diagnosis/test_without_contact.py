@@ -43,9 +43,10 @@ def test_undamped_modes_give_a_sum_of_lines(frequencies):
 
 
 def test_a_conserved_motion():
-    """Without a drive an undamped mode that was set going goes on, and is not chaotic."""
+    """Without a drive an undamped mode that was set going goes on: 70 of its periods are 31 cycles; it is neutral."""
     verdict = diagnose(machine([0.7], 0.0, 0.0, 0.31), initial_state=[1e-3, 0.0], budget=400)
-    assert verdict.nature == "quasiperiodic"
+    assert verdict.words == "periodic, period 31, without contact, neutral"
+    assert verdict.orbit.largest_multiplier == pytest.approx(1.0, abs=1e-9)
 
 
 def test_a_free_body_that_drifts_is_not_judged():

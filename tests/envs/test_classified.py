@@ -1,4 +1,4 @@
-"""The trained classifier of records as an entry of the observation."""
+"""The trained sense of the motion as an entry of the observation."""
 
 import gymnasium as gym
 import numpy as np
@@ -8,7 +8,8 @@ import chaosgym
 from chaosgym.control.controllers import BackOff
 from chaosgym.control.rollout import play
 from chaosgym.envs.classified import UNKNOWN, RecordsAtSpeed
-from chaosgym.errors import ParameterError
+from chaosgym.envs.sense import STATISTICS, load_sense, save_sense, shipped_sense
+from chaosgym.errors import ModelFileError, ParameterError
 
 BEAM = "chaosgym/ImpactBeam-v1"
 STILL = {"action": "speed", "speed_ripple": 0.0, "tolerances": {}, "classifier": "on"}
@@ -42,28 +43,55 @@ def test_both_entries_stand_in_the_order_of_their_names():
     assert both == seen["monitor",] | seen["classifier",]
 
 
+def of_one(record, lags=(1, 2, 3, 4, 6, 8)):
+    """Statistics of the peaks (cycles,) of one record."""
+    missed = [np.abs(record[lag:] - record[:-lag]).mean() for lag in lags]
+    return [record.mean(), record.std(), record.min(), record.max(), *missed]
+
+
 def test_a_record_is_what_was_felt_since_the_speed_changed():
-    """The entry is the shipped classifier's answer on the last 64 peaks at one speed; too few cycles tell nothing."""
+    """Statistics are of the last 64 peaks at one speed, of the last ten of them, and of the steps' impacts and
+    bouncing; the entry is what the shipped sense makes of them, and too few cycles tell nothing."""
     machine, generator, which = chaosgym.ImpactBeam(), np.random.default_rng(0), np.array([0, 2])
-    peaks = 20.0 + generator.random((2, 100))
+    peaks, impacts, bouncing = 20.0 + generator.random((2, 100)), generator.random((20, 2)), generator.random((20, 2))
     records = RecordsAtSpeed(machine, 1.0, 3)
-    records.add(which, np.array([12.0, 13.0]), peaks[:, :5])
+    records.add(which, np.array([12.0, 13.0]), peaks[:, :5], impacts[0], bouncing[0])
     assert (records.irregular_probability(which) == UNKNOWN).all()
-    for first in range(5, 100, 5):
-        records.add(which, np.array([12.0, 13.0]), peaks[:, first : first + 5])
-    classifier = chaosgym.default_classifier(machine.name)
-    answers = classifier.classify_records(peaks, sensor_error=1.0)["irregular_probability"]
-    assert records.irregular_probability(which).tolist() == list(answers)
-    records.add(which, np.array([12.0, 14.0]), peaks[:, :10])
-    fresh = classifier.classify_records(peaks[1:, :10], sensor_error=1.0)["irregular_probability"]
-    assert records.irregular_probability(which)[1] == fresh[0]
+    for step in range(1, 20):
+        cycles = slice(5 * step, 5 * step + 5)
+        records.add(which, np.array([12.0, 13.0]), peaks[:, cycles], impacts[step], bouncing[step])
+    expected = [12.0, 64.0, 1.0, *of_one(peaks[0, -64:]), *of_one(peaks[0, -10:])]
+    expected += [impacts[:, 0].mean(), bouncing[:, 0].mean(), impacts[-1, 0], bouncing[-1, 0]]
+    told = records.statistics(which)
+    np.testing.assert_allclose(told[0], expected)
+    assert told.shape == (2, len(STATISTICS))
+    assert records.irregular_probability(which).tolist() == shipped_sense(machine.name)(told).tolist()
+    records.add(which, np.array([12.0, 14.0]), peaks[:, :10], impacts[0], bouncing[0])
+    np.testing.assert_allclose(records.statistics(which)[1, 3:23], 2 * of_one(peaks[1, :10]))
     assert records.irregular_probability(np.array([1])) == UNKNOWN
 
 
+def test_a_sense_that_does_not_fit_is_refused(tmp_path):
+    """A file of another number of statistics, or one whose bytes were changed, is refused in one line."""
+    sense, path = shipped_sense("impact-beam"), tmp_path / "sense.npz"
+    save_sense(sense, {}, path)
+    statistics = np.random.default_rng(0).uniform(1.0, 50.0, (4, len(STATISTICS)))
+    np.testing.assert_array_equal(load_sense(path)(statistics), sense(statistics))
+    path.write_bytes(path.read_bytes()[:-40])
+    with pytest.raises(ModelFileError):
+        load_sense(path)
+    save_sense(sense._replace(mean=sense.mean[1:]), {}, path)
+    with pytest.raises(ModelFileError, match=r"can't be read as a sense|does not tell"):
+        load_sense(path)
+    with pytest.raises(ModelFileError, match="no sense is shipped for any-machine"):
+        shipped_sense("any-machine")
+
+
 def test_backing_off_by_the_classifier_leaves_chaos():
-    """On the nominal beam at a demand in chaos, backing off by the classifier spends fewer irregular cycles."""
+    """On beams of the fleet's training, backing off by the trained sense spends fewer irregular cycles."""
+    fleet = {"level": "fleet", "split": "train", "steps": 60}
     shares = [
-        play(controller, BEAM, [3, 4], steps=40, tolerances={}).type_iii_share.mean()
+        play(controller, "chaosgym/ImpactBeamTolerance-v1", range(12), **fleet).type_iii_share.mean()
         for controller in (chaosgym.control.controllers.Follow(), BackOff(classified=True))
     ]
     assert shares[1] < shares[0]

@@ -177,7 +177,7 @@ def test_the_job_ends_when_it_is_done(name: str) -> None:
     [
         ({"lowest_speed": 0.0}, "lowest_speed: "),
         ({"lowest_speed": 300.0, "highest_speed": 200.0}, "lowest_speed = 300 is out of range; allowed: up to"),
-        ({"cycles_per_step": 2.5}, "cycles_per_step = 2.5 is not a whole number"),
+        ({"cycles_per_step": 2.5}, "cycles_per_step = 2.5 is out of range; allowed: whole numbers from"),
         ({"type_iii_weight": -1.0}, "type_iii_weight = -1 is out of range"),
         ({"highest_demand": 1e6}, "highest_demand = 1e+06 is out of range"),
         ({"action": "jump"}, "action = 'jump' is not one of trim, continuous, speed"),

@@ -23,7 +23,7 @@ from chaosgym.control.controllers import (
     SkipBands,
     Table,
 )
-from chaosgym.control.controllers.table import CLASSES, Tables
+from chaosgym.control.controllers.table import CLASSES, LearnedTables
 from chaosgym.control.guard import GuardedPolicy
 from chaosgym.control.maps import Maps
 from chaosgym.control.policies import TrainedPolicy, load_policy, save_policy, shipped_policy
@@ -49,7 +49,7 @@ class Smallest(Entry):
         """Those of any force."""
         return 0.0, 5.0 * task.reference_force
 
-    def values(self, which, peaks, jobs):
+    def values(self, which, peaks, jobs, seen):
         """Least peak of each."""
         return peaks.min(axis=1)
 
@@ -76,7 +76,7 @@ def _tables():
     shape = (len(GRID), CLASSES)
     share = np.tile(_maps().share[:1].T, shape[1])
     mean = np.broadcast_to(np.linspace(0.0, 4.0, CLASSES)[:, None], (*shape, 5))
-    return Tables(share, 50.0 + 0.0 * share, mean, np.ones((*shape, 5)))
+    return LearnedTables(share, 50.0 + 0.0 * share, mean, np.ones((*shape, 5)))
 
 
 def _policy(**changes):

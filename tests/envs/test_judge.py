@@ -115,3 +115,23 @@ def test_kicks_in_one_call_move_a_crank_as_kicks_cycle_by_cycle():
         return [(step[0].tobytes(), *step[1:]) for step in steps]
 
     assert played(0) == played(1)
+
+
+@pytest.mark.parametrize(("speed", "nature"), [(12.0, "calm"), (20.6, "irregular")])
+def test_the_last_step_is_told_in_the_form_of_every_verdict(speed, nature):
+    """At 12 Hz the beam repeats, at 20.6 Hz it is chaotic: a step says so, by the numbers of its info."""
+    env, info = _env("ImpactBeam", speed)
+    told = env.unwrapped.statement
+    assert told.nature == nature == diagnosed(speed)
+    assert told.certainty == f"{info['type_iii']:.0%} of the cycles are irregular"
+    assert told.reason.endswith(f": {info['irregularity']:.3g}")
+    assert told.lines()[0].startswith(f"{nature} (")
+    env.reset(seed=1)
+    with pytest.raises(gym.error.ResetNeeded, match="no step was run"):
+        env.unwrapped.statement  # noqa: B018
+
+
+def diagnosed(speed):
+    """Whether the nominal beam is irregular at a speed, by its diagnosis."""
+    beam = gym.make("chaosgym/ImpactBeam-v1").unwrapped.nominal
+    return "calm" if diagnose(beam.at(speed), budget=400).nature == "periodic" else "irregular"

@@ -51,7 +51,7 @@ def test_a_fleet_varies_what_no_sensor_tells(env):
 
 @given(seed=st.integers(0, 10**6), machine=st.integers(0, 255), level=st.sampled_from(["clearance", "fleet"]))
 def test_splits_share_no_machine(seed, machine, level):
-    """By a rule of its own: train and test are told by the cells of the draw, and outside has one field beyond."""
+    """Train and test are told by the cells of the draw; outside has one field beyond, and corner all of them."""
     widths = tolerances_of(chaosgym.ImpactBeam(), level)
     for split in SPLITS:
         variants = Variants(chaosgym.ImpactBeam(), widths, split)
@@ -60,9 +60,9 @@ def test_splits_share_no_machine(seed, machine, level):
             variants.shares(np.random.default_rng([HELD_OUT_SEED, machine]), machine),
         ):
             beyond = np.abs(shares) > 1.0
-            assert beyond.sum() == (split == "outside")
+            assert beyond.sum() == {"outside": 1, "corner": len(shares)}.get(split, 0)
             cells = sum(int((share + 1.0) // 0.25) for share in shares)
-            if split != "outside":
+            if split not in ("outside", "corner"):
                 assert (cells % 4 == 1) == (split != "train")
 
 
@@ -98,6 +98,29 @@ def test_who_plays_meets_the_machines_of_the_split():
     assert not np.array_equal(played["test"].felt, played["outside"].felt)
     sealed = play(follow, BEAM, [0, 1], split="test", sealed=True, steps=3)
     assert not set(sealed.seeds) & set(played["test"].seeds)
+
+
+def test_a_machine_does_several_jobs_in_turn():
+    """Three jobs on a machine, then three on another, with other demands, in a vector too; a seed begins anew."""
+    single = gym.make(BEAM, level="fleet", jobs=3, steps=2).unwrapped
+    seen = []
+    for k in range(7):
+        single.reset(seed=5 if k == 0 else None)
+        seen.append((single.machine.damping_ratio, tuple(single._job.demand[0])))
+    ratios, demands = zip(*seen, strict=True)
+    assert [ratios.index(ratio) for ratio in ratios] == [0, 0, 0, 3, 3, 3, 6]
+    assert len(set(demands)) > 3
+    envs = native_envs(BEAM, 2, level="fleet", jobs=3, steps=2, autoreset_mode="Disabled")
+    for k in range(4):
+        envs.reset(seed=[5, 6] if k == 0 else None)
+        assert envs.jobs.machines[0].damping_ratio == ratios[k]
+    single.reset(seed=5)
+    assert single.machine.damping_ratio == ratios[0]
+    _, info = single.reset(options={"machine": 7})
+    number = [info["machine"], *(single.reset()[1]["machine"] for _ in range(3))]
+    assert number == [7, 7, 7, -1]
+    with pytest.raises(ParameterError, match="jobs = 0"):
+        gym.make(BEAM, jobs=0)
 
 
 @pytest.mark.parametrize(

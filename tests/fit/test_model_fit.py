@@ -15,8 +15,8 @@ from chaosgym import ImpactBeam, SliderCrank, read_machine, simulate
 from chaosgym.diagnosis.diagnose import diagnose_alone
 from chaosgym.diagnosis.response_type import default_tolerances
 from chaosgym.errors import DiagnosisError
+from chaosgym.fit.model_draws import figures, names_of
 from chaosgym.fit.model_fit import ModelFit, model_fit, with_record
-from chaosgym.fit.record_figures import figures, names_of
 from chaosgym.machines.machine_file import template
 from chaosgym.machines.parameters import with_settings
 from chaosgym.recordings.judge import judge_peaks
@@ -131,12 +131,17 @@ def test_a_gap_that_was_stated_wrongly_is_found(beam):
 @pytest.mark.slow
 @pytest.mark.parametrize(("frequency", "nature"), [(11.5, "periodic"), (7.6, "chaotic")])
 def test_records_of_another_integrator_with_noise_on_the_force(frequency, nature):
-    """The oscillator by SciPy, off its nominal numbers, 0.5 % of noise on each cycle's force: its nature is told."""
+    """The oscillator by SciPy, off its nominal numbers, 0.5 % of noise on each cycle's force: most of the posterior.
+
+    Some machines within the tolerances of the chaotic one are periodic, so its nature is told, or left open.
+    """
     nominal = ImpactOscillator(frequency=frequency)
     true = ImpactOscillator(frequency=1.01 * frequency, gap=1.03e-3, damping=1.9)
     assert diagnose_alone(true, budget=800).nature == nature
     found = model_fit(nominal, peaks_by_scipy(true, 128, 0.005, 1))
-    assert (found.fits, found.nature) == (True, nature)
+    assert found.fits
+    assert found.shares[nature] > 0.8
+    assert found.nature == nature or (nature == "chaotic" and found.nature == "undetermined")
 
 
 @pytest.mark.slow

@@ -1,9 +1,8 @@
-"""Kernels to the last bit: stored models in, cycles out, without a library of linear algebra between.
+"""Models and cycles to the last bit.
 
-Eigenvectors and inverses differ in their last bits from processor to processor, and chaos magnifies that. Kernels add
-in a fixed order and multiply where their source says so. So they repeat their bits on stored models on every processor
-with fused multiply-add and the same library of elementary functions. Tables of a drive are products by a library of
-linear algebra, which must fuse too (``fuses``).
+Models are made and kernels run in arithmetic of a fixed order, so both repeat their bits on every processor with fused
+multiply-add and the same library of elementary functions. Cycles start from the stored models: a digit that a model
+moves is told apart from one that a kernel moves.
 
 `python -m tests.golden.bits` writes the file anew. Do so with a change that is meant to move a last digit, and say in
 the commit by how much it moved. Nothing that is shipped rests on these bits.
@@ -16,13 +15,10 @@ from typing import Any
 from unittest.mock import patch
 
 import numpy as np
-from scipy.linalg.blas import dgemm
 
 from chaosgym import ExactEvents, ImpactBeam, SliderCrank
-from chaosgym.core.modal_model import ModalImpactModel
 from chaosgym.core.tangent import Tangents
 from chaosgym.machines import Machine
-from chaosgym.machines.flexible_model import with_tables
 
 STORED = Path(__file__).with_name("bits.npz")
 
@@ -55,35 +51,11 @@ def rebuilt(model: Any, name: str, stored: Mapping[str, np.ndarray]) -> Any:
     return stored[name] if isinstance(model, np.ndarray) else type(model)(stored[name].item())
 
 
-def turned(model: ModalImpactModel, stored: Mapping[str, np.ndarray]) -> ModalImpactModel:
-    """A model whose modal coordinates have the signs of the stored ones: an eigenvector has no sign of its own."""
-    regimes, others = model.regimes, stored["beam: model.regimes.from_modal"]
-    sign = np.sign(np.sum(regimes.from_modal * others, axis=1))
-    regimes = regimes._replace(
-        to_modal=sign[:, :, None] * regimes.to_modal,
-        from_modal=sign[:, None] * regimes.from_modal,
-        output=sign * regimes.output,
-    )
-    return with_tables(
-        model._replace(regimes=regimes, rest=sign[:, None] * model.rest, drift=sign[:, None] * model.drift)
-    )
-
-
-def fuses() -> bool:
-    """Whether the library that multiplies matrices in kernels rounds a product and its sum once.
-
-    With x = 1 + 2^-30 the square of x less 1 + 2^-29 is 2^-60 then, and else 0.
-    """
-    x = 1.0 + 2.0**-30
-    ahead = np.array([[-1.0 - 2.0**-29, x], [x, -1.0 - 2.0**-29]])  # whichever it adds first
-    return bool(dgemm(1.0, ahead, np.array([[1.0, x], [x, 1.0]])).diagonal().any())
-
-
 def results(machine: Machine, model: Any) -> Arrays:
     """Everything that the kernel of a machine writes from rest, and the growth of two deviations."""
     arrays = machine.arrays(CYCLES, 3)
     along = {}
-    if machine.carries_deviations:
+    if machine.moving.deviations:
         along["tangents"] = Tangents(np.eye(machine.n_states)[:2].copy(), np.zeros((CYCLES, 2)))
     coordinates, bouncing = np.zeros(machine.n_states), np.zeros(3)
     with patch.object(type(machine), "reduce", lambda *_: model):

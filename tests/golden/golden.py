@@ -136,7 +136,7 @@ def _points() -> Iterator[tuple[str, Machine]]:
 
 
 def _label(machine: Machine) -> str:
-    verdict = chaosgym.diagnose(machine, budget=BUDGET)
+    verdict = chaosgym.diagnose(machine, budget=BUDGET).labelled("thesis")
     return f"{verdict.nature} {verdict.period}" if verdict.period else verdict.nature
 
 

@@ -14,7 +14,7 @@ def pressed(apart, rate, gap, stiffness, damping, hertz=False):
     """Force of a pin in its hole on the pin, which lies ``apart`` from the hole's middle: linear, or Hertzian."""
     distance = math.hypot(*apart)
     if distance <= gap:
-        return np.zeros(2)
+        return np.zeros(len(apart))
     unit, depth = apart / distance, distance - gap
     approach = damping * float(unit @ rate)
     push = stiffness * depth**1.5 * (1.0 + approach) if hertz else stiffness * depth + approach
@@ -83,6 +83,51 @@ def wrist_pin(
     instants, states = _solved(slope, start, rate, cycles, samples, 1000)
     both = zip(instants, states, strict=True)
     return np.array([math.hypot(*pressed(*gap_of(t, y)[:2], gap, stiffness, damping, hertz)) for t, y in both]), states
+
+
+def pin_and_guide(
+    rate,
+    gaps,
+    stiffness,
+    damping,
+    cycles,
+    samples,
+    crank,
+    rod,
+    rod_mass,
+    rod_inertia,
+    slider,
+    radius,
+    laws,
+):
+    """Slider crank with clearance at the wrist pin and in the guide, which holds the slider's turn; both rub.
+
+    ``gaps``, ``stiffness``, ``damping`` and ``laws``, coefficients with the sign of the sliding speed, are those of
+    pin and guide. Returns the forces of both.
+    """
+
+    def forces(time, state):
+        place, speed, _ = _pin(time, crank, rate)
+        along, across = _axes(state[0])
+        apart = state[1:3] - place - rod * along
+        change = state[4:6] - speed - rod * state[3] * across
+        pin = pressed(apart, change, gaps[0], stiffness[0], damping[0])
+        return pin, pressed(state[2:3], state[5:6], gaps[1], stiffness[1], damping[1])[0], across
+
+    def slope(time, state):
+        pin, guide, across = forces(time, state)
+        rub = laws[0](-radius * state[3])
+        moment = rub * radius * math.hypot(*pin)
+        pin = pin + rub * np.array([-pin[1], pin[0]])
+        lifted = _pin(time, crank, rate)[2] + np.array([0.0, 9.81])
+        turn = moment - rod_mass * 0.5 * rod * float(across @ lifted) - rod * float(across @ pin)
+        pull = [pin[0] - laws[1](state[4]) * abs(guide), pin[1] + guide - slider * 9.81]
+        return [*state[3:], turn / (rod_inertia + rod_mass * rod**2 / 4.0), *(each / slider for each in pull)]
+
+    start = [0.0, crank + rod, 0.0, -crank / rod * rate, 0.0, 0.0]
+    instants, states = _solved(slope, start, rate, cycles, samples, 1000)
+    found = [forces(t, y) for t, y in zip(instants, states, strict=True)]
+    return np.array([(math.hypot(*pin), abs(guide)) for pin, guide, _ in found]).T
 
 
 def knee(rate, gap, stiffness, damping, cycles, samples, ground, crank, coupler, rocker, gravity=9.81):

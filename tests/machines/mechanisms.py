@@ -5,7 +5,7 @@ import math
 import numpy as np
 
 from chaosgym.machines.mechanism import equations
-from chaosgym.machines.mechanism.joints import Joint
+from chaosgym.machines.mechanism.joints import LinkJoint
 from chaosgym.machines.mechanism.links import Body, rigid_link
 from chaosgym.machines.mechanism.mechanism import Mechanism
 from chaosgym.machines.mechanism.nominal import revolution_of
@@ -27,6 +27,16 @@ OFFSET = {
 """Keywords of a ``SliderCrank`` whose centres of mass lie off the axes."""
 
 
+def joint(name, kind, first, second, *lines):
+    """Text of a [[joint]] of a file between two points, with more lines of it."""
+    return "\n".join([f'[[joint]]\nname = "{name}"\nkind = "{kind}"\nbetween = ["{first}", "{second}"]', *lines])
+
+
+def surface(clearance, stiffness, damping):
+    """Lines of a [[joint]] with clearance."""
+    return f'clearance = "{clearance}"\nstiffness = "{stiffness}"\ndamping = "{damping}"'
+
+
 def four_bar(ground=3.0, crank=1.0, coupler=4.0, rocker=2.5, gravity=9.81, opened=("along", "across"), **other):
     """Four-bar, lengths and masses of Akhadkar, Acary and Brogliato (2016), clearance of coupler and rocker."""
 
@@ -41,10 +51,10 @@ def four_bar(ground=3.0, crank=1.0, coupler=4.0, rocker=2.5, gravity=9.81, opene
             bar("rocker", "pivot", "end", rocker, 1.2),
         ),
         (
-            Joint("motor", "revolute", ("ground", "shaft"), ("crank", "shaft"), driven=True),
-            Joint("pin", "revolute", ("crank", "pin"), ("coupler", "pin")),
-            Joint("knee", "revolute", ("coupler", "end"), ("rocker", "end"), opened=opened),
-            Joint("pivot", "revolute", ("ground", "pivot"), ("rocker", "pivot")),
+            LinkJoint("motor", "revolute", ("ground", "shaft"), ("crank", "shaft"), driven=True),
+            LinkJoint("pin", "revolute", ("crank", "pin"), ("coupler", "pin")),
+            LinkJoint("knee", "revolute", ("coupler", "end"), ("rocker", "end"), opened=opened),
+            LinkJoint("pivot", "revolute", ("ground", "pivot"), ("rocker", "pivot")),
         ),
         {"shaft": (0.0, 0.0), "pivot": (ground, 0.0)},
         (0.0, -gravity),

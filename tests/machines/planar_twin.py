@@ -19,14 +19,14 @@ from typing import NamedTuple
 
 import numpy as np
 
-from chaosgym.machines.slider_crank.coordinates import (
+from chaosgym.machines.slider_crank.equations import (
     BALL_ACROSS,
     BALL_ALONG,
     ROD_STRETCH,
     SLIDER_ACROSS,
     SLIDER_PITCH,
+    Equations,
 )
-from chaosgym.machines.slider_crank.equations import Equations
 from tests.machines.connecting_rod import elastic_constants, rods_of
 
 ALONG_A, ACROSS_A, ALONG_B, ACROSS_B, MODES = 0, 1, 2, 3, 4

@@ -12,11 +12,11 @@ import chaosgym
 from chaosgym import SliderCrank, simulate
 from chaosgym.errors import ParameterError
 from chaosgym.machines.mechanism.beam import bending_of, fibre_stress
-from chaosgym.machines.mechanism.buckling import buckling
 from chaosgym.machines.mechanism.equations import small_motion
-from chaosgym.machines.mechanism.joints import Joint
+from chaosgym.machines.mechanism.joints import LinkJoint
 from chaosgym.machines.mechanism.links import Beam
 from chaosgym.machines.mechanism.nominal import revolution_of
+from chaosgym.machines.mechanism.notes import buckling
 from chaosgym.machines.mechanism.space import SpatialBody, spatial_link
 from chaosgym.machines.mechanism.spatial import SpatialMechanism
 from chaosgym.machines.mechanism.spatial_beam import fibre_stress_around, spatial_beam_link
@@ -81,10 +81,10 @@ def shaft(pull):
             spatial_link("bearing", {"pin": none}, (SpatialBody(1.0, (1e-3, 1e-3, 1e-3)),)),
         ),
         (
-            Joint("motor", "revolute", ("ground", "hub"), ("hub", "end"), "", "", (), True, 0.0, x_axis, x_axis),
-            Joint("cross", "universal", ("hub", "end"), ("shaft", "start"), first_axis=y_axis, second_axis=z_axis),
-            Joint("ball", "spherical", ("shaft", "end"), ("bearing", "pin"), first_axis=x_axis, second_axis=x_axis),
-            Joint(
+            LinkJoint("motor", "revolute", ("ground", "hub"), ("hub", "end"), "", "", (), True, 0.0, x_axis, x_axis),
+            LinkJoint("cross", "universal", ("hub", "end"), ("shaft", "start"), first_axis=y_axis, second_axis=z_axis),
+            LinkJoint("ball", "spherical", ("shaft", "end"), ("bearing", "pin"), first_axis=x_axis, second_axis=x_axis),
+            LinkJoint(
                 "guide",
                 "prismatic",
                 ("ground", "hub"),
@@ -201,11 +201,11 @@ def test_stress_around_a_rod_is_that_of_its_planes(bent):
     np.testing.assert_allclose(around[[0, 8], :4], fibre_stress(flat, link.beam, 0.1, 0.003), rtol=1e-12)
     np.testing.assert_allclose(around[[4, 12], 4:], around[[0, 8], 1:4], rtol=1e-2)
     assert np.abs(around[[0, 8], 4:]).max() < 1e-9 * np.abs(around).max()
-    rows = machine.fibre_stress("rod", 0.1, 0.003)
+    rows = machine.bending_parts["rod"].stress(0.1, 0.003)
     assert rows.shape == (16, len(machine.degrees_of_freedom))
     bent.write_text(bent.read_text().replace('diameter = "6.35 mm"', 'width = "5 mm"\nheight = "6 mm"'))
     with pytest.raises(ParameterError, match="link 'rod' bends in space and is not round"):
-        chaosgym.read_machine(bent).fibre_stress("rod", 0.1, 0.003)
+        chaosgym.read_machine(bent).bending_parts["rod"].stress(0.1, 0.003)
 
 
 UNDAMPED = """[ground]

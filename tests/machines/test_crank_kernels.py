@@ -217,7 +217,7 @@ def test_a_cubic_that_dips_between_slopes_of_one_sign_is_not_taken_for_quiet():
 def test_deviations_are_the_derivative_of_a_revolution(change):
     """Deviations carried through every contact equal central differences to 1e-5, and leave the motion as it is."""
     machine = replace(CRANK, **change)
-    assert machine.carries_deviations
+    assert machine.moving.deviations
     integrator = ExactEvents(event_tolerance=1e-13)
     state = simulate(machine, 1, transient=5).final_state.coordinates
     n = len(state)

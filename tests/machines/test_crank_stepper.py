@@ -7,8 +7,9 @@ import pytest
 
 from chaosgym.core.binned.taylor import advance
 from chaosgym.core.cycle import cycle_arrays
+from chaosgym.core.tangent import Tangents, no_tangents
 from chaosgym.machines.binned.stepped import stepped_model
-from chaosgym.simulation import ExactEvents, simulate
+from chaosgym.simulation import ExactEvents, simulate, simulate_with_deviations
 from tests.machines.crank_twin import rigid_ball_twin
 from tests.plain_modes import PLAIN_CRANK
 
@@ -25,12 +26,14 @@ BALL = replace(
 )
 
 
-def stepped(machine, cycles, step_phase):
+def stepped(machine, cycles, step_phase, tangents=None):
     """Run a piecewise linear machine by the stepper."""
     states = 2 * len(machine.degrees_of_freedom)
     arrays = cycle_arrays(cycles, states, travels=True)
     model = stepped_model(machine, step_phase)
-    outcome, _ = advance(model, np.zeros(states), np.zeros(3), arrays, 1e-13, 10_000)
+    outcome, _ = advance(
+        model, np.zeros(states), np.zeros(3), arrays, 1e-13, 10_000, tangents or no_tangents(states, 2)
+    )
     assert outcome == 0
     return arrays
 
@@ -54,6 +57,43 @@ def test_stepper_and_exact_propagation_agree(machine):
     np.testing.assert_allclose(
         other.contact_time.sum(axis=1), exact.contact_fraction.sum(axis=1) * machine.cycle_period, rtol=1e-6
     )
+
+
+@pytest.mark.parametrize("friction", [0.0, 0.1])
+def test_deviations_of_stepper_and_exact_propagation_agree(friction):
+    """Two revolutions of impacts with dampers: two kernels that share no step carry all deviations alike, to 1e-4."""
+    machine = replace(SMALL_GAP, friction_coefficient=friction)
+    states = machine.n_states
+    record, exact, _ = simulate_with_deviations(machine, 2, deviations=np.eye(states), orthonormal=False)
+    along = Tangents(np.eye(states), np.empty((2, 0)))
+    stepped(machine, 2, 0.25, along)
+    assert record.impacts.sum() > 3
+    weight = machine.state_weights(record.final_state.coordinates)
+    scaled = weight * exact / weight[:, None]
+    np.testing.assert_allclose(weight * along.vectors / weight[:, None], scaled, atol=1e-4 * np.abs(scaled).max())
+
+
+@pytest.mark.parametrize(
+    ("machine", "share"),
+    [(BALL, 1e-6), (replace(SMALL_GAP, ball_joint="spherical", motor_angle=10.0), 1e-8)],
+    ids=["ball", "both joints"],
+)
+def test_deviations_of_the_stepper_are_the_derivative_of_its_motion(machine, share):
+    """A revolution of round contacts: carried deviations equal central differences to 1e-4."""
+    precise, states = ExactEvents(step_phase=0.125, event_tolerance=1e-13), machine.n_states
+    start = simulate(machine, 1, transient=2).final_state.coordinates
+    weight = machine.state_weights(start)
+    record, carried, growth = simulate_with_deviations(
+        machine, 1, start, deviations=np.diag(1.0 / weight), orthonormal=False, integrator=precise
+    )
+    assert growth.shape == (1, 0)
+    step = share * np.linalg.norm(weight * start)
+    moved = [start + sign * step / weight[i] * np.eye(states)[i] for sign in (1.0, -1.0) for i in range(states)]
+    ends = np.array([simulate(machine, 1, each, integrator=precise).final_state.coordinates for each in moved])
+    differences = weight * (ends[:states] - ends[states:]) / (2.0 * step)
+    np.testing.assert_allclose(weight * carried, differences, atol=1e-4 * np.abs(differences).max())
+    plain = simulate(machine, 1, start, integrator=precise)
+    assert np.array_equal(plain.final_state.coordinates, record.final_state.coordinates)
 
 
 @pytest.mark.parametrize(

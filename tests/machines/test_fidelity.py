@@ -14,7 +14,8 @@ import chaosgym
 from chaosgym.cli import app
 from chaosgym.errors import ParameterError
 from chaosgym.machines import ImpactBeam, SliderCrank
-from chaosgym.machines.parameters import with_settings
+from chaosgym.machines.accuracy import model_within
+from chaosgym.machines.parameters import expand_fidelity, with_settings
 from chaosgym.simulation import CycleRecord, simulate
 from tests.plain_modes import HARD_BEAM
 from thesis.scorecard.evaluation import THESIS_MACHINES
@@ -39,8 +40,8 @@ def test_a_machine_keeps_its_rung_when_other_fields_change():
 @pytest.mark.parametrize(
     ("machine", "settings", "message"),
     [
-        (ImpactBeam, {"fidelity": "fine", "n_modes": 5}, "'fine' sets n_modes = 6, and n_modes = 5 is given too"),
-        (ImpactBeam, {"fidelity": "fine", "n_modes": 6}, "'fine' sets n_modes = 6, and n_modes = 6 is given too"),
+        (ImpactBeam, {"fidelity": "fine", "n_modes": 5}, "'fine' sets n_modes = 10, and n_modes = 5 is given too"),
+        (ImpactBeam, {"fidelity": "fine", "n_modes": 10}, "'fine' sets n_modes = 10, and n_modes = 10 is given too"),
         (SliderCrank, {"fidelity": "draft", "rod": "rigid"}, "'draft' sets rod = 'flexible', and rod = 'rigid'"),
         (ImpactBeam, {"fidelity": "flexible-1deg"}, "'flexible-1deg' is not one of standard, fine, reference"),
         (SliderCrank, {"fidelity": "finest"}, "'finest' is not one of draft, standard, fine, reference"),
@@ -143,6 +144,19 @@ def test_environments_take_the_keyword(env_id, rung):
     env.close()
 
 
+def test_a_tolerance_is_one_model_for_all_machines_of_an_environment():
+    """Opt-in: the cheapest model within it at speeds over the whole range; a field of it may not be given too."""
+    env = gym.make("chaosgym/ImpactBeam-v1", fidelity="1 %")
+    nominal, task = env.unwrapped.nominal, env.unwrapped.task
+    points = [nominal.at(speed) for speed in np.linspace(task.lowest_speed, task.highest_speed, 5).tolist()]
+    assert nominal.n_modes > 4
+    assert model_within(nominal, "1 %", points).machine == nominal
+    env.reset(seed=1)
+    assert env.unwrapped.machine.n_modes == nominal.n_modes
+    with pytest.raises(ParameterError, match="fidelity = '1 %' chooses n_modes"):
+        gym.make("chaosgym/ImpactBeam-v1", fidelity="1 %", n_modes=5)
+
+
 @pytest.mark.parametrize("machine", [ImpactBeam, SliderCrank])
 def test_the_rung_standard_is_the_default(machine):
     """Of a machine, an environment and the command line. The thesis' own crank stands beside the ladder."""
@@ -162,3 +176,10 @@ def test_the_command_line_takes_the_option():
     both = CliRunner().invoke(app, ["simulate", "impact-beam", "--fidelity", "fine", "--set", "n_modes=2"])
     assert isinstance(both.exception, ParameterError)
     assert "n_modes" in str(both.exception)
+
+
+def test_a_fidelity_that_is_no_text_is_named():
+    """A list in a brief, or a bare number, is one line and no traceback."""
+    for given in ([], 3, {"a": 1}):
+        with pytest.raises(ParameterError, match=r"is not one of .*, nor a tolerance"):
+            expand_fidelity(ImpactBeam(), {"fidelity": given})

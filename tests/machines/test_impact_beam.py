@@ -135,7 +135,7 @@ def test_beam_is_a_frozen_machine_with_described_parameters():
         ({"excitation_frequency": 0.0}, r"excitation_frequency = 0 Hz is out of range"),
         ({"length": math.nan}, r"length = nan m is out of range"),
         ({"length": "long"}, r"length = 'long' is out of range"),
-        ({"n_modes": 2.5}, r"n_modes = 2\.5 is not a whole number"),
+        ({"n_modes": 2.5}, r"n_modes = 2\.5 is out of range; allowed: whole numbers from 1"),
         ({"n_modes": True}, r"n_modes = True is out of range"),
         ({"damping_family": "viscous"}, r"damping_family = 'viscous' is not one of uniform, stiffness"),
         ({"reduction": "interfaces", "n_modes": 3}, r"n_modes = 3 .* allowed: 4 or more and 0"),

@@ -10,7 +10,7 @@ from chaosgym.errors import ParameterError
 from chaosgym.machines.mechanism.beam import beam_link
 from chaosgym.machines.mechanism.equations import small_motion
 from chaosgym.machines.mechanism.forces import Spring
-from chaosgym.machines.mechanism.joints import Joint
+from chaosgym.machines.mechanism.joints import LinkJoint
 from chaosgym.machines.mechanism.links import Beam
 from chaosgym.machines.mechanism.mechanism import Mechanism
 from chaosgym.machines.mechanism.nominal import nominal, revolution_of
@@ -231,8 +231,8 @@ def test_joints_that_hold_the_same_motion_are_named():
     crank = mechanism_of(SliderCrank())
     guides = (
         *crank.joints[:2],
-        Joint("yoke", "prismatic", ("rod", "end"), ("slider", "pivot")),
-        Joint("slider", "prismatic", ("ground", "shaft"), ("slider", "pivot")),
+        LinkJoint("yoke", "prismatic", ("rod", "end"), ("slider", "pivot")),
+        LinkJoint("slider", "prismatic", ("ground", "shaft"), ("slider", "pivot")),
     )
     with pytest.raises(ParameterError, match=r"moves in two ways: .*yoke.*slider.* depend on each other"):
         revolution_of(Mechanism(crank.links, guides, crank.ground))

@@ -180,13 +180,13 @@ def test_one_stop_is_one_sided():
 
 def test_pictures_show_the_stops_that_there_are():
     """One stop is one shaded ground, from the stop on; an offset moves both of two."""
-    lower, upper = one_mode(stops="one").room
+    lower, upper = one_mode(stops="one").room_of()
     assert lower == -math.inf
     assert upper == one_mode().clearance
     moved = one_mode(offset=1e-4)
-    assert moved.room == (1e-4 - moved.clearance, 1e-4 + moved.clearance)
+    assert moved.room_of() == (1e-4 - moved.clearance, 1e-4 + moved.clearance)
     for machine, number in ((one_mode(stops="one"), 1), (moved, 2)):
-        assert len(response.stops(machine.room, Figure().subplots()).patches) == number
+        assert len(response.stops(machine.room_of(), Figure().subplots()).patches) == number
 
 
 def test_an_offset_gap_with_different_stops_agrees_with_fixed_steps():
@@ -268,8 +268,6 @@ BAD = {
     "a drive at rest": ([('"0.96, 2.02, -0.05', '"0, 0, 0')], "moves no mode"),
     "a drive of two kinds": ([('# unbalance = "20', 'unbalance = "20')], "force and unbalance"),
     "frequencies of 1e6 Hz": ([('"8.7, 54.6, 153 Hz"', '"8.7, 54.6, 1e6 Hz"')], 'units = "t mm N"'),
-    "shapes of size one": (
-        [('"2.83, -2.79, 2.71', '"1, -1, 1'), ('"0.96, 2.02, -0.05', '"0.3, 0.7, 0')], "not mass-normalised"),
     "a reversed range": ([('"6 to 24 Hz"', '"24 to 6 Hz"')], "speed_range is no range"),
     "a wrong tolerance": ([("damping_factor =", "dampening =")], "no key 'dampening'"),
     "a damper that varies": ([('"60 N s/m"', '"1, 2, 3 N s/m"')], "is several numbers; allowed: one, which holds at"),
@@ -277,8 +275,17 @@ BAD = {
     "no such file": (
         [("frequencies = ", "# frequencies = "), ('# matrices = "model.npz"', 'matrices = "gone.npz"')], "gone.npz"),
     "no TOML": ([("[joint]", "[joint")], "is not valid TOML"),
+    "two tables": ([("[joint]", "[joint]\n[[joint]]")], "; allowed: each key once, and [[NAME]]"),
     "a number of no task": ([("# [job]", "[job]"), ("# reference_force", "referense_force")], None),
 }  # fmt: skip
+
+
+def test_shapes_whose_largest_entry_is_one_are_told(machine_file):
+    """They are those of modal masses of 1 kg, or not mass-normalised: a note asks, and the machine runs."""
+    unit = [('"2.83, -2.79, 2.71', '"1, -1, 1'), ('"0.96, 2.02, -0.05', '"0.3, 0.7, 0')]
+    machine = chaosgym.read_machine(machine_file(*unit))
+    assert any("right only if each modal mass is 1 kg" in note for note in machine.notes)
+    assert chaosgym.simulate(machine, 1).peak_force.shape == (1, 2)
 
 
 @pytest.mark.parametrize("case", BAD)

@@ -83,15 +83,16 @@ def gas(theta):
     return -(pressure - 1e5) * math.pi / 4.0 * 0.06**2
 
 
-def by_hand(stall, no_load, wheel, cycles, rate=0.0):
+def by_hand(stall, no_load, wheel, cycles, rate=0.0, curve=None):
     """Instants of whole turns and the motion (t, theta, w) of the crank in time, by LSODA; fewer if it stops."""
+    given = curve or (lambda w: stall * (1.0 - w / no_load))
 
     def slope(_, state):
         theta, w = state
         felt, change = inertia(theta)
         moved = slide(theta)[0]
         pull = gas(theta) - 100.0 * (place(theta) - 0.1) - 40.0 * moved * w
-        torque = stall * (1.0 - w / no_load) - 0.5 * change * w**2 - height(theta) + pull * moved
+        torque = given(w) - 0.5 * change * w**2 - height(theta) + pull * moved
         return [w, torque / (wheel + felt)]
 
     def turned(_, state):
@@ -132,6 +133,28 @@ def test_a_run_up_is_that_of_the_equation_of_motion(wheel, motored):
     last = found.y[1][(found.t > turns[18]) & (found.t < turns[19])] * 30.0 / math.pi
     assert run.lowest[-1] == pytest.approx(last.min(), abs=1e-3 * run.speed[-1])
     assert run.highest[-1] == pytest.approx(last.max(), abs=1e-3 * run.speed[-1])
+
+
+CURVE = 'speeds = "0, 500, 1000, 1400, 1500 rpm"\ntorques = "25, 20, 40, 50, 0 N m"\n'
+
+
+def test_a_curve_of_torque_is_that_of_the_equation_of_motion(motored):
+    """An induction motor, weaker at half its speed than at rest: each turn to 0.02 %, the first one to 0.2 %."""
+    line = 'stall_torque = "60 N m"\nno_load_speed = "1500 rpm"\n'
+    given = with_settings(motored((line, CURVE)), {"motor_inertia": 0.2})
+    rates = np.array([0.0, 500.0, 1000.0, 1400.0, 1500.0]) * math.pi / 30.0
+    turns, _ = by_hand(0, 0, 0.2, 20, curve=lambda w: float(np.interp(w, rates, [25.0, 20.0, 40.0, 50.0, 0.0])))
+    found, expected = given.under_motor(20).speed, 60.0 / np.diff(np.append(0.0, turns))[:20]
+    np.testing.assert_allclose(found[1:], expected[1:], rtol=2e-4)
+    assert found[0] == pytest.approx(expected[0], rel=2e-3)
+    for change, told in (
+        ((CURVE, line + CURVE), "motor.stall_torque has no meaning beside motor.speeds"),
+        (("50, 0 N m", "0 N m"), "motor.speeds has 5 numbers and motor.torques 4"),
+        (("0, 500", "10, 500"), "two or more numbers that grow from 0 rpm on"),
+        (("50, 0 N m", "50, 5 N m"), "0 N m at the last speed"),
+    ):
+        with pytest.raises(ParameterError, match=told):
+            motored((line, CURVE), change)
 
 
 def test_it_settles_where_the_motor_gives_what_is_taken(motored):
@@ -243,7 +266,7 @@ def test_what_is_wrong_with_a_motor_is_told(motored, tmp_path):
         motored(('no_load_speed = "1500 rpm"\n', ""))
     with pytest.raises(ParameterError, match="motor_inertia = -1 kg m\\^2 is out of range"):
         motored(("0.02 kg m^2", "-1 kg m^2"))
-    with pytest.raises(ParameterError, match=r"line is so steep .*; allowed: \[motor\] inertia from"):
+    with pytest.raises(ParameterError, match=r"curve is so steep .*; allowed: \[motor\] inertia from"):
         with_settings(motored(), {"motor_stall_torque": 1e6}).under_motor()
     yoke = (FOLDER / "scotch-yoke.toml").read_text(encoding="utf-8")
     still = re.sub(r"\n\[operation\]", "\n" + MOTOR.replace("0.02 kg", "0 kg"), yoke)

@@ -9,7 +9,7 @@ import pytest
 from chaosgym import ModalMachine, SliderCrank, Structure, simulate
 from chaosgym.errors import ParameterError, SimulationError
 from chaosgym.machines.flexible_model import Modes, flexible_model
-from chaosgym.machines.slider_crank import model as crank_model
+from chaosgym.machines.slider_crank import machine as crank_model
 
 SECONDS = 300
 """Time that a kernel may take, its compilation included; without a bound it takes for ever."""

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from chaosgym.machines.periodic import between, derivatives
+from chaosgym.machines.mechanism.sums import between, derivatives
 
 
 @pytest.mark.parametrize("count", [61, 62])

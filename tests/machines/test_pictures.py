@@ -5,8 +5,10 @@ import re
 import numpy as np
 import pytest
 
-from chaosgym import ImpactBeam, SliderCrank, simulate
+from chaosgym import ImpactBeam, SliderCrank, read_machine, simulate
 from chaosgym.machines import MACHINES
+from chaosgym.machines.machine_file import template
+from chaosgym.machines.mechanism.picture import link_lines
 
 SAMPLES = 60
 FILES = ["four-bar-akhadkar", "compressor", "quick-return", "scotch-yoke", "slider-crank-thesis-15deg"]
@@ -108,3 +110,50 @@ def test_a_gap_of_nothing_is_drawn(machine):
     """Nothing is divided by it."""
     _, sketch = sketched(machine)
     assert all(np.isfinite(shape.points).all() for shape in sketch.shapes)
+
+
+def test_a_spring_and_a_damper_are_drawn_between_their_points(tmp_path):
+    """The spring as a zigzag, the damper as a straight line, from the shaft to the slider at every moment."""
+    spring = 'between = ["ground.shaft", "slider.wrist"]\nstiffness = "2 kN/m"\nfree_length = "150 mm"\n'
+    damper = 'between = ["ground.shaft", "slider.wrist"]\ndamping = "2 N s/m"\n'
+    text = template("slider-crank").replace("[operation]", f"[[spring]]\n{spring}[[damper]]\n{damper}[operation]")
+    (tmp_path / "sprung.toml").write_text(text)
+    machine = read_machine(tmp_path / "sprung.toml")
+    _, sketch = sketched(machine)
+    coil, dashpot = (shape.points[:, 0] for shape in sketch.shapes if shape.points.shape[2] == 10)
+    slider = link_lines(machine, machine.nominal_places(np.arange(SAMPLES) * (2.0 * np.pi / SAMPLES)))["slider"][:, 0]
+    for line in (coil, dashpot):
+        np.testing.assert_allclose(line[:, 0], 0.0, atol=1e-12)
+        np.testing.assert_allclose(line[:, -1], slider, atol=1e-9)
+    lengths = [np.linalg.norm(np.diff(line, axis=1), axis=-1).sum(axis=1) for line in (coil, dashpot)]
+    np.testing.assert_allclose(lengths[1], np.linalg.norm(slider, axis=1), rtol=1e-9)
+    assert np.all(lengths[0] > 1.05 * lengths[1])
+    check_it_fits(sketch)
+
+
+def test_joints_of_a_structure_are_drawn_between_their_stops():
+    """Each joint of the pipe moves as told: its block touches a stop where its displacement reaches it."""
+    record, sketch = sketched(MACHINES["docs/machines/pipe-in-two-supports.toml"]())
+    blocks = [shape for shape in sketch.shapes if shape.kind == "body" and len(shape.points) == SAMPLES]
+    stops = [shape.points[0, 0, :, 1] for shape in sketch.shapes if shape.colour is None]
+    told = [words.text[0] for words in sketch.words if "drawn" in words.text[0]]
+    for j, block in enumerate(blocks):
+        times = float(re.search(r"drawn ([\d,]+) times", told[j])[1].replace(",", ""))
+        motion = record.histories[-1, :, 3 * j]
+        upper, lower = record.machine.stops[j]
+        from_stop = stops[2 * j].min() - block.points[:, 0, :, 1].max(axis=1)
+        np.testing.assert_allclose(from_stop, times * (upper - motion), rtol=1e-9, atol=1e-9)
+        from_stop = block.points[:, 0, :, 1].min(axis=1) - stops[2 * j + 1].max()
+        np.testing.assert_allclose(from_stop, times * (motion - lower), rtol=1e-9, atol=1e-9)
+    assert [text.splitlines()[1] for text in told] == ["half the play 0.15 mm", "half the play 0.25 mm"]
+    check_it_fits(sketch)
+
+
+@pytest.mark.parametrize("name", ["moon-shaw-1983", "friction-damper", "kahraman-singh-1990", "motor-with-backlash"])
+def test_every_kind_of_joint_of_a_structure_is_drawn(name):
+    """One stop, friction, varying stiffness, and what turns: all that is drawn fits, with a force at each stop."""
+    machine = MACHINES[f"docs/machines/{name}.toml"]()
+    _, sketch = sketched(machine)
+    check_it_fits(sketch)
+    stops = sum(np.isfinite(machine.room_of()))
+    assert sum("N" in words.text[0].split() for words in sketch.words) == stops

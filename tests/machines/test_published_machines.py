@@ -9,7 +9,7 @@ import pytest
 import chaosgym
 from benchmarks.published import in_scipy, no_separation, orbit_diagram
 from chaosgym.diagnosis import diagnose
-from chaosgym.machines.linear_impact import restitution_of
+from chaosgym.machines.contact_law import restitution_of
 from chaosgym.machines.modal_machine.drive import Drive
 from chaosgym.machines.modal_machine.structure import Structure
 from chaosgym.machines.parameters import with_settings

@@ -9,11 +9,11 @@ import pytest
 from chaosgym.errors import ParameterError
 from chaosgym.machines.mechanism.equations import crank_inertia, small_motion
 from chaosgym.machines.mechanism.forces import Spring
-from chaosgym.machines.mechanism.joints import Joint
+from chaosgym.machines.mechanism.joints import LinkJoint
 from chaosgym.machines.mechanism.nominal import nominal, revolution_of
 from chaosgym.machines.mechanism.space import SpatialBody, spatial_link
 from chaosgym.machines.mechanism.spatial import SpatialMechanism
-from chaosgym.machines.periodic import derivatives
+from chaosgym.machines.mechanism.sums import derivatives
 from chaosgym.machines.slider_crank.machine import SliderCrank
 from chaosgym.machines.slider_crank.mechanism import mechanism_of
 from tests.machines.mechanisms import ANGLES, OFFSET, assembled, assert_equal
@@ -92,10 +92,14 @@ def cardan(angle):
             spatial_link("output", {"start": none}, body, axis=x_axis),
         ),
         (
-            Joint("motor", "revolute", ("ground", "hub"), ("input", "end"), "", "", (), True, 0.0, x_axis, x_axis),
-            Joint("first", "universal", ("input", "end"), ("middle", "start"), first_axis=y_axis, second_axis=z_axis),
-            Joint("second", "universal", ("middle", "end"), ("output", "start"), first_axis=z_axis, second_axis=y_axis),
-            Joint(
+            LinkJoint("motor", "revolute", ("ground", "hub"), ("input", "end"), "", "", (), True, 0.0, x_axis, x_axis),
+            LinkJoint(
+                "first", "universal", ("input", "end"), ("middle", "start"), first_axis=y_axis, second_axis=z_axis
+            ),
+            LinkJoint(
+                "second", "universal", ("middle", "end"), ("output", "start"), first_axis=z_axis, second_axis=y_axis
+            ),
+            LinkJoint(
                 "bearing",
                 "cylindrical",
                 ("ground", "far"),
@@ -140,10 +144,14 @@ def skew_four_bar():
             spatial_link("rocker", {"pivot": none, "ball": (0.0, 0.0, -0.3)}, body, axis=x_axis),
         ),
         (
-            Joint("motor", "revolute", ("ground", "hub"), ("crank", "shaft"), "", "", (), True, 0.0, z_axis, z_axis),
-            Joint("pin", "universal", ("crank", "pin"), ("coupler", "pin"), first_axis=z_axis, second_axis=y_axis),
-            Joint("ball", "spherical", ("coupler", "ball"), ("rocker", "ball"), first_axis=x_axis, second_axis=x_axis),
-            Joint(
+            LinkJoint(
+                "motor", "revolute", ("ground", "hub"), ("crank", "shaft"), "", "", (), True, 0.0, z_axis, z_axis
+            ),
+            LinkJoint("pin", "universal", ("crank", "pin"), ("coupler", "pin"), first_axis=z_axis, second_axis=y_axis),
+            LinkJoint(
+                "ball", "spherical", ("coupler", "ball"), ("rocker", "ball"), first_axis=x_axis, second_axis=x_axis
+            ),
+            LinkJoint(
                 "pivot",
                 "revolute",
                 ("ground", "pivot"),

@@ -56,7 +56,7 @@ modal_damping = [["6 1/s", "0 1/s"], ["0 1/s", "1.5 1/s"]]
 modal_masses = "{J_MOTOR / RADIUS**2:.17g}, {J_LOAD / RADIUS**2:.17g} kg"
 
 [structure.shapes]
-motor = "1, 0 kg^-1/2"
+motor = "1, 0"
 load = "0, 1"
 
 [joint]
@@ -165,14 +165,16 @@ name = "shaft"
     assert chaosgym.simulate(machine, 3).peak_force.shape == (3, 4)
 
 
+NORMALISED = ('modal_masses = ["12 kg cm^2", "0.004 kg·m²"]', ""), ('"0, 1"', '"0, 1 kg^-1/2 m^-1"')
+
 REFUSED = {
     "a spring of what slides": ([('"0.5 Nm/arcmin"', '"1 N/um"')], "is of what turns and joint"),
     "a force at a point that turns": (
-        [('"1, 0"', '"1, 0 kg^-1/2 m^-1"'), ('"2 N*m"', '"2 N"')],
+        [*NORMALISED, ('"1, 0"', '"1, 0 kg^-1/2 m^-1"'), ('"2 N*m"', '"2 N"')],
         "drive at 'motor' slides, and the shape of 'motor' is of a point that turns",
     ),
     "a shape in metres": (
-        [('"1, 0"', '"1, 0 kg^-1/2"')],
+        [*NORMALISED, ('"1, 0"', '"1, 0 kg^-1/2"')],
         "drive at 'motor' turns, and the shape",
     ),
     "shapes without a unit": ([('modal_masses = ["12 kg cm^2", "0.004 kg·m²"]', "")], "has no unit"),
@@ -274,8 +276,8 @@ WHOLE = {
     ),
     "a base in the unit of a point": (
         {"structure": {"shapes": {"base": "1, 1 kg^-1/2"}}},
-        "structure.shapes.base = '1, 1 kg^-1/2' has no unit; write it in kg^1/2, or in kg^1/2 m if it turns (none is "
-        "needed beside modal_masses)",
+        "structure.shapes.base = '1, 1 kg^-1/2' has no unit; write it in kg^1/2, or in kg^1/2 m if it turns (the "
+        "unit of a mass beside modal_masses)",
     ),
     "a point without a unit": (
         {"structure": {"shapes": {"motor": "1, 0"}}},

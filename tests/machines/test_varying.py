@@ -11,43 +11,43 @@ from scipy.integrate import solve_ivp
 
 import chaosgym
 from chaosgym.cli import app
-from chaosgym.design.bent_section import Bending, Section, stress_of_modes
+from chaosgym.design.bent_section import Bending, Section, fibres
 from chaosgym.errors import ParameterError
-from chaosgym.machines.modal_machine.varying import Spring, VaryingMachine, means
+from chaosgym.machines.modal_machine.varying import HeldSpring, means
+from chaosgym.machines.parameters import with_settings
 from chaosgym.simulation.run import simulate_with_deviations
 
 MACHINES = Path(__file__).parents[2] / "docs" / "machines"
 
 STRUCTURE = chaosgym.Structure.of_modes([9.0, 61.0], 0.02, {"tip": [2.1, -1.9], "side": [0.7, 1.5]})
-BASE = VaryingMachine(
-    modes=STRUCTURE,
-    joint="tip",
-    drives=(chaosgym.Drive.sine("force", "tip", 8.9), chaosgym.Drive.sine("unbalance", "side", 2e-4, 2, 0.4)),
-    speed=19.0,
-    clearance=1e-4,
-    contact_stiffness=1e6,
-    contact_damping=20.0,
-    offset=2e-5,
-    lower_stiffness_factor=0.7,
-)
+DRIVES = chaosgym.Drive.sine("force", "tip", 8.9), chaosgym.Drive.sine("unbalance", "side", 2e-4, 2, 0.4)
+JOINT = {"clearance": 1e-4, "stiffness": 1e6, "damping": 20.0, "offset": 2e-5, "lower_stiffness_factor": 0.7}
+
+
+def built(structure=STRUCTURE, drives=DRIVES, springs=(), speed=19.0, at="tip", operation=None, **joint):
+    """Machine whose only joint, "joint", is ``JOINT`` with some changes."""
+    joints = {"joint": chaosgym.Joint(at, **{**JOINT, **joint})}
+    return chaosgym.machine_with_joints(structure, joints, drives, springs=springs)(speed=speed, **(operation or {}))
+
+
 MESH = tuple(float(value) for value in 1.0 + 0.4 * np.cos(np.arange(24) * math.pi / 12.0) + 0.1 * (np.arange(24) > 9))
-HOLDING = Spring("side", tuple(2e4 * (1.0 + np.sin(np.arange(40) * math.pi / 20.0))))
+HOLDING = HeldSpring("side", tuple(2e4 * (1.0 + np.sin(np.arange(40) * math.pi / 20.0))))
 
 
 def dop853(machine, cycles, held=True):
-    """States (cycles + 1, 2n) by DOP853 with events, from the equations in the docstring of ``varying``.
+    """States (cycles + 1, 2n) by DOP853 with events, from the equations in the docstring of ``held_joints``.
 
     Stiffness is held as the machine holds it, or continuous: the straight lines between its samples.
     """
     n, rate, bins = machine.n_states // 2, 2.0 * math.pi * machine.speed, machine.bins
-    phi, tau = machine.modes.shape(machine.joint), np.zeros(n)
-    if machine.friction:
-        tau = machine.friction * machine.modes.shape(machine.slides)
+    phi, tau = machine.display, np.zeros(n)
+    if machine.slides:
+        tau = machine.joint_friction * machine.modes.shape(machine.slides["joint"])
     squares, damping = machine.modes.angular_frequency**2, machine.modes.damping
-    k = np.array([1.0, machine.lower_stiffness_factor]) * machine.contact_stiffness
-    d = np.array([1.0, machine.lower_damping_factor]) * machine.contact_damping
-    gaps = machine.clearance + np.array([1.0, -1.0]) * machine.offset
-    sides = (1.0, -1.0) if machine.stops == "two" else (1.0,)
+    k = np.array([1.0, machine.joint_lower_stiffness_factor]) * machine.joint_stiffness
+    d = np.array([1.0, machine.joint_lower_damping_factor]) * machine.joint_damping
+    gaps = machine.joint_clearance + np.array([1.0, -1.0]) * machine.joint_offset
+    sides = (1.0, -1.0) if machine.joint_stops == "two" else (1.0,)
 
     def over_cycle(values):
         values = np.mean(values) + machine.variation * (np.asarray(values) - np.mean(values))
@@ -56,11 +56,12 @@ def dop853(machine, cycles, held=True):
         closed, steps = np.append(values, values[0]), np.arange(len(values) + 1) / len(values)
         return lambda t, b: np.interp(t * machine.speed % 1.0, steps, closed)
 
-    mesh = over_cycle(np.array(machine.samples) / np.mean(machine.samples)) if machine.samples else lambda t, b: 1.0
+    samples = np.array(machine.samples.get("joint", [1.0]))
+    mesh = over_cycle(samples / np.mean(samples)) if len(samples) > 1 else lambda t, b: 1.0
     springs = [(machine.modes.shape(s.at), over_cycle(s.values)) for s in machine.springs]
 
     def load(t):
-        total = machine.preload * phi
+        total = machine.joint_preload * phi
         for drive in machine.drives:
             for order, cosine, sine in drive.harmonics:
                 grows = (order * rate) ** 2 if drive.kind == "unbalance" else 1.0
@@ -111,17 +112,18 @@ def off(machine, states):
     """Largest difference of the joint's place and of the whole state in a run, as a share of gap and state."""
     record = chaosgym.simulate(machine, len(states) - 1)
     found = np.vstack([record.section, record.final_state.coordinates])
-    phi = machine.modes.shape(machine.joint)
-    place = np.max(np.abs((found - states)[:, : len(phi)] @ phi)) / machine.clearance
+    phi = machine.display
+    place = np.max(np.abs((found - states)[:, : len(phi)] @ phi)) / machine.joint_clearance
     return place, np.max(np.abs(found - states) / np.max(np.abs(states), axis=0)), int(record.impacts.sum())
 
 
 CASES = {
-    "friction": replace(BASE, friction=0.3, slides="side"),
-    "friction the other way, one stop": replace(BASE, friction=0.5, slides="-side", stops="one"),
-    "mesh": replace(BASE, samples=MESH),
-    "spring": replace(BASE, springs=(HOLDING,)),
-    "all": replace(BASE, samples=MESH, springs=(HOLDING,), friction=0.2, slides="side", preload=3.0),
+    "friction": built(friction=0.3, slides="side"),
+    "friction the other way, one stop": built(friction=0.5, slides="-side", stops="one"),
+    "mesh": built(samples=MESH),
+    "spring": built(springs=(HOLDING,)),
+    "spring, both stops alike": built(springs=(HOLDING,), offset=0.0, lower_stiffness_factor=1.0),
+    "all": built(samples=MESH, springs=(HOLDING,), friction=0.2, slides="side", preload=3.0),
 }
 
 
@@ -146,10 +148,12 @@ def test_held_stiffness_converges_to_the_continuous_one():
 
 def test_without_friction_and_variation_it_is_the_modal_machine():
     """Two kernels, one machine: forces and impacts of the machine of constant stiffness without friction."""
-    names = ("modes", "joint", "drives", "speed", "clearance", "contact_stiffness", "contact_damping", "offset")
-    same = {name: getattr(BASE, name) for name in (*names, "lower_stiffness_factor")}
-    modal = chaosgym.simulate(chaosgym.ModalMachine(**same), 3)
-    for machine in (BASE, replace(CASES["mesh"], variation=0.0), replace(BASE, slides="side")):
+    names = {"stiffness": "contact_stiffness", "damping": "contact_damping"}
+    of_joint = {names.get(name, name): value for name, value in JOINT.items()}
+    modal = chaosgym.simulate(
+        chaosgym.ModalMachine(modes=STRUCTURE, joint="tip", drives=DRIVES, speed=19.0, **of_joint), 3
+    )
+    for machine in (replace(CASES["mesh"], variation=0.0), built(slides="side")):
         found = chaosgym.simulate(machine, 3)
         np.testing.assert_allclose(found.peak_force, modal.peak_force, rtol=1e-8)
         np.testing.assert_array_equal(found.impacts, modal.impacts)
@@ -167,9 +171,10 @@ def test_peaks_are_those_of_the_time_history():
 
 def test_steady_sliding_rests_where_statics_puts_it():
     """Pressed on a surface that slides past: (W^2 + k (phi + mu tau) phi') q = F phi + k c (phi + mu tau)."""
-    machine = replace(BASE, drive_level=0.0, preload=50.0, friction=0.4, slides="side", damping_factor=50.0)
+    operation = {"drive_level": 0.0, "damping_factor": 50.0}
+    machine = built(preload=50.0, friction=0.4, slides="side", operation=operation)
     phi, tau = STRUCTURE.shape("tip"), STRUCTURE.shape("side")
-    push, k = phi + 0.4 * tau, machine.contact_stiffness
+    push, k = phi + 0.4 * tau, machine.joint_stiffness
     matrix = np.diag(STRUCTURE.angular_frequency**2) + k * np.outer(push, phi)
     rest = np.linalg.solve(matrix, 50.0 * phi + k * 1.2e-4 * push)
     found = chaosgym.simulate(machine, 5, transient=400)
@@ -183,18 +188,8 @@ def test_friction_couples_modes_to_flutter():
     phi, tau = structure.shape("tip"), structure.shape("side")
     rates = []
     for friction in (0.0, 0.6, 1.5):
-        machine = VaryingMachine(
-            modes=structure,
-            joint="tip",
-            speed=20.0,
-            clearance=0.0,
-            contact_stiffness=1e3,
-            contact_damping=0.0,
-            preload=100.0,
-            stops="one",
-            friction=friction,
-            slides="-side",
-        )
+        stop = {"clearance": 0.0, "offset": 0.0, "stiffness": 1e3, "damping": 0.0, "stops": "one", "preload": 100.0}
+        machine = built(structure, (), speed=20.0, friction=friction, slides="-side", **stop)
         matrix = np.diag(structure.angular_frequency**2) + 1e3 * np.outer(phi - friction * tau, phi)
         rates.append(np.max(np.sqrt(-np.linalg.eigvals(matrix).astype(complex)).real))
         start = np.concatenate([np.linalg.solve(matrix, 100.0 * phi), [0.0, 0.0]])
@@ -211,14 +206,12 @@ def test_mathieus_equation(a, trace):
     speed, count = 7.0, 3600
     angle = 2.0 * math.pi * np.arange(count) / count
     values = (math.pi * speed) ** 2 * (a - 10.0 * np.cos(angle))
-    machine = VaryingMachine(
-        modes=chaosgym.Structure.of_modes([0.0], [[0.0]], {"mass": [1.0]}),
-        joint="mass",
-        springs=(Spring("mass", tuple(values)),),
-        speed=speed,
-        clearance=1.0,
-        matrix_update_interval=0.25,
+    structure, springs = (
+        chaosgym.Structure.of_modes([0.0], [[0.0]], {"mass": [1.0]}),
+        (HeldSpring("mass", tuple(values)),),
     )
+    fine = {"matrix_update_interval": 0.25}
+    machine = built(structure, (), springs, speed, "mass", fine, clearance=1.0)
     columns = [
         chaosgym.simulate(machine, 1, initial_state=np.array(s)).final_state.coordinates for s in np.eye(2) * 1e-4
     ]
@@ -295,16 +288,16 @@ def read(folder, *changes):
 def test_a_file_states_friction_and_samples(tmp_path):
     """Keys of a file are fields of the machine; a CSV file and samples that are written out are one."""
     rubs = read(tmp_path, ("damping = ", 'friction = 0.2\nslides = "-side"\ndamping = '))
-    assert (rubs.friction, rubs.slides, rubs.samples) == (0.2, "-side", ())
+    assert (rubs.joint_friction, rubs.slides, rubs.samples) == (0.2, {"joint": "-side"}, {})
     assert any("friction always pulls '-side'" in note for note in rubs.notes)
     varies = read(tmp_path, ('"1 N/um"', '"1, 1.5, 0.5, 1 N/um"'))
-    assert varies.contact_stiffness == pytest.approx(1e6)
+    assert varies.joint_stiffness == pytest.approx(1e6)
     (tmp_path / "mesh.csv").write_text("angle [deg],k [N/um]\n0,1\n90,1.5\n180,0.5\n270,1\n")
     from_csv = read(tmp_path, ('"1 N/um"', '"mesh.csv"'))
     assert from_csv.samples == varies.samples
     spring = '[[spring]]\nat = "side"\nstiffness = "10, 20, 30 N/mm"\n[[drive]]'
     held = read(tmp_path, ("[[drive]]", spring))
-    assert held.springs == (Spring("side", (1e4, 2e4, 3e4)),)
+    assert held.springs == (HeldSpring("side", (1e4, 2e4, 3e4)),)
     assert type(read(tmp_path)).__mro__[1] is chaosgym.ModalMachine
 
 
@@ -326,7 +319,7 @@ def test_a_file_states_friction_and_samples(tmp_path):
         ),
         ('"1 N/um"', '"1, -0.5, 2 N/um"', "out of range"),
         ('"1 N/um"', '"1, 2 N/um"', "joint.stiffness has 2 samples of a cycle; allowed: 1, or 3 to 3600"),
-        ('"1 N/um"', '"0, 0, 3, 0 N/um"', "stiffness of the joint is 0 somewhere"),
+        ('"1 N/um"', '"0, 0, 3, 0 N/um"', "stiffness of joint is 0 somewhere"),
         ('"1 N/um"', '"mesh.csv"', "mesh.csv"),
         ('"1 N/um"\ndamping = "20 N s/m"', '"1, 2, 1 N/um"\nrestitution = 0.8', "restitution needs one stiffness"),
         ("[[drive]]", '[[spring]]\nat = "side"\nstiffness = "-1 N/mm"\n[[drive]]', "spring.stiffness"),
@@ -348,19 +341,26 @@ def test_bad_input_is_told_in_a_line(tmp_path, old, new, told):
     assert "\n" not in str(error.value)
 
 
-def test_what_goes_with_one_joint_only_is_told(tmp_path):
-    """Several joints refuse friction, samples and springs; a variation that turns the stiffness over is refused."""
-    two = '[[joint]]\nname = "b"\nat = "side"\nclearance = "1 mm"\nstiffness = "1 N/um"\ndamping = "1 N s/m"\n'
-    for change, told in (
-        (("clearance = ", 'friction = 0.1\nslides = "side"\nclearance = '), "joint.slides does not go with several"),
-        (
-            ('stiffness = "1 N/um"\ndamping = "20', 'stiffness = "1, 2, 3 N/um"\ndamping = "20'),
-            "stiffness over the cycle",
-        ),
-        (("[operation]", '[[spring]]\nat = "tip"\nstiffness = "1 N/mm"\n[operation]'), "[[spring]] does not go with"),
+def test_several_joints_may_slide_or_vary(tmp_path):
+    """Beside a joint that is out of reach, friction, samples and springs give the forces of the one joint to 1e-9."""
+    two = '[[joint]]\nname = "b"\nat = "side"\nclearance = "9 mm"\nstiffness = "1 N/um"\ndamping = "1 N s/m"\n'
+    for change in (
+        ("clearance = ", 'friction = 0.1\nslides = "side"\nclearance = '),
+        ('stiffness = "1 N/um"\ndamping = "20', 'stiffness = "1, 2, 3 N/um"\ndamping = "20'),
+        ("[operation]", '[[spring]]\nat = "tip"\nstiffness = "1, 2, 3 N/mm"\n[operation]'),
     ):
-        with pytest.raises(ParameterError, match=told.replace("[", r"\[")):
-            read(tmp_path, change, ("[joint]", two + "[[joint]]"))
+        alone = read(tmp_path, change)
+        both = read(tmp_path, ("[joint]", "[[joint]]"), change, ("[operation]", two + "[operation]"))
+        assert both.moving.how == alone.moving.how
+        forces = [chaosgym.simulate(machine, 5).peak_force for machine in (alone, both)]
+        np.testing.assert_allclose(forces[0], forces[1], rtol=1e-9)
+
+
+def test_what_does_not_go_together_is_told(tmp_path):
+    """Friction that sticks beside samples, a variation that turns the stiffness over, fixed steps: a line for each."""
+    both = ("damping = ", 'friction = 0.1\ntangent = "side"\ndamping = ')
+    with pytest.raises(ParameterError, match=r"joint.stiffness over the cycle does not go with joint.tangent"):
+        read(tmp_path, ('"1 N/um"', '"1, 2, 3 N/um"'), both)
     varies = read(tmp_path, ('"1 N/um"', '"1, 1.5, 0.5, 1 N/um"'))
     with pytest.raises(ParameterError, match="with variation = 3; allowed: 0 or more"):
         replace(varies, variation=3.0)
@@ -370,7 +370,8 @@ def test_what_goes_with_one_joint_only_is_told(tmp_path):
 
 def monodromy(machine, speed):
     """Matrix over a cycle of the gear pair whose teeth stay in mesh, by DOP853."""
-    closed = np.append(machine.samples, machine.samples[0])
+    samples = machine.samples["joint"]
+    closed = np.append(samples, samples[0])
 
     def slope(t, z):
         stiffness = np.interp(t * speed % 1.0, np.linspace(0.0, 1.0, len(closed)), closed)
@@ -394,7 +395,7 @@ def test_lightly_loaded_gears_are_chaotic():
     """Varying mesh and little load: chaos at 1200 and 1500 Hz where the full load has one impact a cycle, or two."""
     gears = chaosgym.read_machine(MACHINES / "kahraman-singh-1991.toml")
     for speed in (1200.0, 1500.0):
-        assert chaosgym.diagnose(replace(gears, preload=10.0).at(speed), budget=800).nature == "chaotic"
+        assert chaosgym.diagnose(with_settings(gears, {"preload": 10.0}).at(speed), budget=800).nature == "chaotic"
         assert chaosgym.diagnose(gears.at(speed), budget=800).nature == "periodic"
 
 
@@ -417,4 +418,4 @@ def test_bending_of_a_joint_that_rubs_is_refused(tmp_path):
     rubs = read(tmp_path, ("damping = ", 'friction = 0.2\nslides = "side"\ndamping = '))
     section = Section(curvatures=(0.7, 4.2))
     with pytest.raises(ParameterError, match="constant stiffness and without friction"):
-        stress_of_modes(rubs, Bending(section=section))
+        fibres(rubs, Bending(section=section))

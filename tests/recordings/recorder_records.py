@@ -410,9 +410,9 @@ FROZEN = (
 KINDS = (*TUNED, *FROZEN)
 
 
-def make(kind, seed):
+def make(kind, seed, draw=99, kinds=KINDS):
     """(readings, what is stated, the truth) of a kind; cycles and statement go through all pairs with the seeds."""
-    rng = np.random.default_rng([seed, 99, KINDS.index(kind)])
+    rng = np.random.default_rng([seed, draw, kinds.index(kind)])
     made = kind(rng, (150, 400, 1200)[seed % 3])
     statement = STATEMENTS[seed // 3 % 4]
     stated = {} if statement == "not" else {"sensor_error": FACTORS[statement] * ERROR}
@@ -438,19 +438,19 @@ def answer(made, verdict):
 ANSWERS = ("right", "right, if", "undetermined", "wrong", "wrong, if")
 
 
-def table(kinds, seeds):
+def table(kinds, seeds, made=make):
     """Counts of answers by kind, and those that are wrong."""
     from chaosgym.recordings.judge import judge_peaks
 
     counts, wrong = {}, []
     for kind in kinds:
         for seed in seeds:
-            peaks, stated, made = make(kind, seed)
+            peaks, stated, truth = made(kind, seed)
             verdict = judge_peaks(peaks, **stated)
-            told = answer(made, verdict)
+            told = answer(truth, verdict)
             counts[kind.__name__, told] = counts.get((kind.__name__, told), 0) + 1
             if told.startswith("wrong"):
-                wrong.append((kind.__name__, seed, made.nature, verdict.diagnosis.words, verdict.diagnosis.reason))
+                wrong.append((kind.__name__, seed, truth.nature, verdict.diagnosis.words, verdict.diagnosis.reason))
     return counts, wrong
 
 

@@ -65,7 +65,11 @@ def test_clocks_give_the_rate(clock, tmp_path):
         ("time,force\n", lambda k, x: f"{50 * k},{x}", "rises in steps of 50 without a unit; .*20 if these are milli"),
         ("time,force\n", lambda k, x: f"{0.5 * k},{x}", "rises in steps of 0.5 without a unit; .*2000 if these are"),
         ("Sample rate: 500 Hz\ntime,force\n", lambda k, x: f"{k / RATE:.3f},{x}", "of 0.001 .*the file states 500 Hz"),
-        ("time,force\n", lambda k, x: f"13:32:{10 + k // 3000},{x}", "too coarse to tell samples apart; use --rate-hz"),
+        (
+            "time,force\n",
+            lambda k, x: f"13:32:{10 + k // 3000},{x}",
+            "too coarse to tell samples apart; use --read rate-hz",
+        ),
         ("time,force\n", lambda k, x: f"{1_000_000_000 + 500 * k},{x}", "in steps of 500 without a unit"),
         (
             "time,force\n",
@@ -85,12 +89,22 @@ def test_clocks_that_cannot_be_told_are_a_question(heading, row, message, tmp_pa
     assert cut.period == pytest.approx(0.05, rel=1e-3)
 
 
+def test_a_stated_rate_that_contradicts_the_file_is_said(tmp_path):
+    """A rate of 500 Hz over stamps of 1000 Hz doubles every time: who stated it reads what the file says."""
+    recording = series(tmp_path, "time [s],force\n", lambda k, x: f"{k / RATE:.4f},{x}")
+    signal, _ = peaks_of_series(recording, rate_hz=0.5 * RATE)
+    assert signal.described.endswith("at 500 Hz as stated, instead of 1000 Hz by column 'time' [s]")
+    assert peaks_of_series(recording, rate_hz=RATE)[0].described.endswith("at 1000 Hz as stated")
+
+
 def test_two_rates_of_a_file_are_a_question(tmp_path):
     """The bearing set of the MFPT society: ``sr`` is the sampling rate, ``rate`` that of the shaft."""
     path = tmp_path / "baseline_1.mat"
     savemat(path, {"bearing": {"gs": FORCE[:, None], "sr": 97656.0, "rate": 25.0, "load": 270.0}})
     recording = read_recording(path)
-    with pytest.raises(DiagnosisError, match=r"several rates: bearing.sr = 97656 Hz, bearing.rate = 25 Hz; use --rate"):
+    with pytest.raises(
+        DiagnosisError, match=r"several rates: bearing.sr = 97656 Hz, bearing.rate = 25 Hz; use --read rate-hz"
+    ):
         peaks_of_series(recording)
     assert peaks_of_series(recording, rate_hz=97656.0)[0].described.endswith("at 97656 Hz as stated")
 

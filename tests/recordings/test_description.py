@@ -65,6 +65,18 @@ def test_bursts_are_seen_and_even_noise_has_none():
     assert judge_peaks(100.0 + 4.0 * rng.normal(size=1000)).description == ()
 
 
+@pytest.mark.parametrize("excess", [0.05, 0.1])
+def test_bursts_grow_as_the_map_of_type_three_intermittency_does(excess):
+    """The map has slope -(1 + excess) at its fixed point 1/3, by which deviations grow (Pomeau and Manneville 1980)."""
+    x, series = 0.2, []
+    for _ in range(2500):
+        x = (1.0 - 2.0 * x - (1.0 - excess) * np.cos(2.0 * np.pi * (x - 1.0 / 12.0)) / (2.0 * np.pi)) % 1.0
+        series.append(x)
+    found = seen(read(9, 100.0 + 40.0 * np.array(series[500:])), "growth of bursts")
+    assert found["growth_per_cycle"] == pytest.approx(excess, abs=0.01)
+    assert found["level"] == pytest.approx(100.0 + 40.0 / 3.0, abs=0.2)
+
+
 def test_a_sampling_beat_and_hum_are_told_by_the_rate_of_the_series():
     """Half sines sampled 8.38 times a cycle beat; a line of 50 Hz is an alias at 12.3 cycles a second."""
     starts = 8.38 * np.arange(400)

@@ -115,6 +115,35 @@ def test_a_line_is_told_with_its_period():
     assert found.cycles == pytest.approx(1.0 / 0.2113, rel=1e-3)
 
 
+@pytest.mark.parametrize(("overtone", "nature"), [(0.0, "periodic"), (0.05, "quasiperiodic")])
+def test_what_is_added_from_outside_has_no_multiples(overtone, nature):
+    """A sinusoid of 15 % is a hum, however large; with a multiple of 5 % of it, it is an oscillation of the machine."""
+    turns = 2.0 * np.pi * 0.2713 * np.arange(400)
+
+    def humming(rng):
+        return read(rng, 100.0 + 21.0 * (np.cos(turns) + overtone * np.cos(2.0 * turns)))
+
+    assert {words.partition(",")[0] for words in natures(humming, sensor_error=0.4)} == {nature}
+
+
+@pytest.mark.parametrize(("size", "nature"), [(1000, "periodic, period 5, if"), (64, "undetermined")])
+def test_a_sinusoid_of_five_cycles_is_a_pattern_if_it_is_seen_often(size, nature):
+    """A hum seldom lies within a thousandth of a fifth of a cycle by chance, but often within a sixtieth."""
+    pattern = 100.0 + 10.0 * np.cos(0.4 * np.pi * np.arange(size))
+    told = natures(lambda rng: pattern + 3.0 * rng.normal(size=size), sensor_error=1.0)
+    assert all(words.startswith(nature) for words in told)
+
+
+def test_a_hum_on_a_pattern_that_is_seen_a_few_times_is_no_longer_pattern():
+    """A pattern of 8 cycles and a hum near 5/32 over 128 cycles is as well one of 32, which is not claimed."""
+
+    def humming(rng):
+        hum = 10.0 * np.cos(2.0 * np.pi * 0.15647 * np.arange(128))
+        return np.resize(rng.uniform(40.0, 60.0, 8), 128) + hum + 0.2 * rng.normal(size=128)
+
+    assert not [words for words in natures(humming) if words.startswith("periodic, period 32")]
+
+
 @pytest.mark.parametrize("correlation", [0.0, 0.5, 0.9, 0.99])
 def test_noise_has_neither_a_long_pattern_nor_a_line(correlation):
     """Of 40 records of noise of any correlation none has a pattern or a line."""
@@ -137,3 +166,21 @@ def test_noise_around_a_resting_map_is_periodic():
     told = natures(driven)
     assert sum(words.startswith("periodic, period 2, if") for words in told) >= 2
     assert set(told) == {"undetermined", *(words for words in told if words.startswith("periodic, period 2, if"))}
+
+
+@pytest.mark.parametrize("cycles", [150, 400])
+def test_an_alternation_as_small_as_the_scatter_is_a_period(cycles):
+    """Peaks alternate by 0.5 N in random scatter of 0.25 N: period 2, under the condition that period 1 would have."""
+    rng = np.random.default_rng(cycles)
+    peaks = 50.0 + 0.25 * (-1.0) ** np.arange(cycles) + 0.25 * rng.normal(size=cycles)
+    found = judge_peaks(peaks).diagnosis
+    assert (found.nature, found.period) == ("periodic", 2)
+    assert found.condition.startswith("if its scatter of 0.4") or found.condition.startswith("if its scatter of 0.5")
+
+
+@pytest.mark.parametrize("seed", range(4))
+def test_random_scatter_has_no_period(seed):
+    """White noise, and noise whose neighbours differ in sign, do not alternate."""
+    noise = np.random.default_rng(seed).normal(size=402)
+    for scatter in (noise[2:], noise[2:] - 0.3 * noise[1:-1]):
+        assert judge_peaks(100.0 + 0.5 * scatter).diagnosis.period == 1

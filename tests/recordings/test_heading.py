@@ -125,7 +125,7 @@ def test_a_counter_is_no_clock(tmp_path):
     path.write_text("n,F [N]\n" + rows("{i},{x}\n"))
     recording = read_recording(path)
     assert choose_time(recording) is None
-    with pytest.raises(DiagnosisError, match="no time column; use --rate-hz"):
+    with pytest.raises(DiagnosisError, match="no time column; use --read rate-hz"):
         sampling(recording, COUNT)
 
 

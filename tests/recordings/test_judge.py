@@ -280,7 +280,7 @@ def test_short_records_are_refused(size):
 @pytest.mark.parametrize("kind", ["sensor_error", "sensor_sigma"])
 def test_errors_that_are_none_are_refused(kind, error):
     """Neither infinity, nor nothing, nor a negative one."""
-    with pytest.raises(DiagnosisError, match="finite, 0 or more"):
+    with pytest.raises(DiagnosisError, match="out of range; allowed: 0 N or more"):
         judge_peaks(np.ones(20), **{kind: error})
 
 
@@ -352,3 +352,31 @@ if __name__ == "__main__":
         found, missed = judged(module, module.KINDS, range(first, first + int(sys.argv[1])))
         show(found)
         print(*missed, sep="\n")
+
+
+def _logistic(parameter, seed, cycles=150):
+    """Readings of a logistic map, with errors up to 0.4 N."""
+    generator = np.random.default_rng(seed)
+    x, found = generator.uniform(0.2, 0.8), []
+    for _ in range(600 + cycles):
+        x = parameter * x * (1.0 - x)
+        found.append(x)
+    return 50.0 + 80.0 * np.array(found[-cycles:]) + generator.uniform(-0.4, 0.4, cycles)
+
+
+def test_a_pattern_that_was_left_before_is_periodic_under_a_condition():
+    """Beside the tangent bifurcation at 3.8284 a pattern of three cycles is left and found again, for ever."""
+    found = [judge_peaks(_logistic(3.8284, seed), sensor_error=0.4).diagnosis for seed in range(24)]
+    left = [one for one in found if "does not leave its pattern again, as before cycle" in one.condition]
+    assert left
+    assert all((one.nature, one.period) == ("periodic", 3) for one in left)
+
+
+def test_a_response_that_settles_did_not_leave_its_pattern():
+    """A motion that dies out comes near its pattern once."""
+    k = np.arange(200)
+    for seed in range(12):
+        generator = np.random.default_rng(seed)
+        dying = 30.0 * generator.uniform(0.75, 0.9) ** k * np.cos(generator.uniform(0.0, np.pi) * k)
+        verdict = judge_peaks(100.0 + dying + generator.uniform(-0.4, 0.4, 200), sensor_error=0.4).diagnosis
+        assert "leave its pattern" not in verdict.condition

@@ -62,7 +62,7 @@ def test_times_and_rates_make_a_series(tmp_path):
 def test_samples_without_a_rate_are_refused(tmp_path):
     """A column of forces over time that lost its times is no record of peaks; stated as such, it is taken so."""
     told = recording(tmp_path, "force [N]", SAMPLES)
-    with pytest.raises(DiagnosisError, match=r"rest between impacts.*--rate-hz.*--as peaks"):
+    with pytest.raises(DiagnosisError, match=r"rest between impacts.*rate-hz=.*as=peaks"):
         kind(told)
     assert kind(told, stated="peaks") == "peaks"
     assert kind(told, of_series="a rate of 100 Hz") == "series"
@@ -75,7 +75,7 @@ def test_samples_without_a_rate_are_refused(tmp_path):
 def test_stamped_peaks_may_be_either(tmp_path, heading):
     """Twenty readings a second that jump: one a cycle of 20 Hz, or a slow machine sampled; the file cannot tell."""
     told = recording(tmp_path, heading, 0.05 * np.arange(200), PEAKS)
-    with pytest.raises(DiagnosisError, match=r"20 readings a second.*state --as peaks, or --as series"):
+    with pytest.raises(DiagnosisError, match=r"20 readings a second.*state --read as=peaks, or --read as=series"):
         kind(told)
     assert kind(told, stated="peaks") == "peaks"
 

@@ -1,10 +1,15 @@
 """Types along a measured sweep, against what the thesis reads from figures 3.16 and 4.22."""
 
+import itertools
+from pathlib import Path
+
 import numpy as np
 import pytest
 
 from chaosgym.errors import DiagnosisError
 from chaosgym.recordings.measured_sweep import sweep_types
+from chaosgym.recordings.runs import RecordingOptions
+from chaosgym.recordings.swept_files import judged_sweep
 
 ERROR = 3.0
 
@@ -110,3 +115,19 @@ def test_two_doublings_before_irregular_motion_name_the_route(levels, route, upw
     assert found.route == route
     assert found.because.startswith("periods: 1 at")
     assert {found.periodic, found.irregular} == ({len(levels) - 1, len(levels)} if upwards else {1, 2})
+
+
+def test_a_folder_of_one_file_a_speed_is_a_sweep(tmp_path):
+    """The same readings in 27 files, or in one, have the same types; speeds in two units are refused."""
+    stated = RecordingOptions(sensor_error=3.0)
+    heading, *rows = Path("docs/data/sweep.csv").read_text().splitlines()
+    by_speed = itertools.groupby(rows, lambda row: row.partition(",")[0])
+    for speed, own in by_speed:
+        (tmp_path / f"{float(speed):04.1f}.csv").write_text("\n".join([heading, *own]) + "\n")
+    whole, parts = judged_sweep("docs/data/sweep.csv", stated), judged_sweep(tmp_path, stated)
+    assert parts.types == whole.types
+    assert parts.notes[0].endswith("; of 27 files")
+    assert judged_sweep(f"{tmp_path}/0*.csv", stated).types.regions[0].last == 7.0
+    (tmp_path / "99.csv").write_text("speed [rpm],peak [N]\n" + "5940,30.0\n" * 30)
+    with pytest.raises(DiagnosisError, match=r"speeds in rpm, .* in Hz; allowed: one unit"):
+        judged_sweep(tmp_path, stated)

@@ -1,5 +1,7 @@
 """The monitor: quiet while peaks repeat, an alarm soon after they do not, and quiet again."""
 
+import pickle
+
 import numpy as np
 import pytest
 
@@ -205,3 +207,16 @@ def test_monitors_side_by_side_are_monitors():
         sums.add(np.arange(3), row, 5.0)
         levels = [monitor.update(float(peak)).level for monitor, peak in zip(monitors, row, strict=True)]
         assert np.array_equal(sums.level(np.arange(3)), levels)
+
+
+def test_a_long_watch_takes_no_more_memory():
+    """What a monitor keeps is as large after 6,000 readings as after 500, and it still hears chaos at once."""
+    monitor, sizes = Monitor(sensor_error=1.0), {}
+    for watch in monitor.watch(50.0 + 10.0 * (np.arange(6000) % 2)):
+        if watch.cycle in (500, 6000):
+            sizes[watch.cycle] = len(pickle.dumps(vars(monitor)))
+        assert not watch.alarm
+    assert sizes[6000] <= sizes[500] + 16  # numbers themselves have more digits
+    alarms = [watch.cycle for watch in monitor.watch(settled(3.9, 40)) if watch.alarm]
+    assert alarms
+    assert alarms[0] < 6000 + 16

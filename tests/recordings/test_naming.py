@@ -90,7 +90,7 @@ def test_two_units_that_differ_are_a_question(form, tmp_path):
     path = tmp_path / "force"
     WRITERS[form](path, "force [N]", "kN", READINGS)
     recording = read_recording(path)
-    with pytest.raises(DiagnosisError, match=r"force' is in N by its title 'force \[N\]' and in kN by .*--unit"):
+    with pytest.raises(DiagnosisError, match=r"force' is in N by its title 'force \[N\]' and in kN by .*--read unit"):
         choose_force(recording, "force")
     np.testing.assert_allclose(choose_force(recording, "force", "kN").values, 1000.0 * READINGS, rtol=1e-6)
 

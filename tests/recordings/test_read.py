@@ -13,6 +13,7 @@ import pytest
 from scipy.io import savemat, wavfile
 
 from chaosgym.errors import DiagnosisError
+from chaosgym.recordings import lines
 from chaosgym.recordings.columns import choose_force, forces
 from chaosgym.recordings.read import read_recording
 
@@ -97,6 +98,7 @@ MANY = "\n".join(",".join(row) for row in ([f"c{k}" for k in range(1000)], ["1"]
         ("cycle,rpm\n1,1140\n2,1141\n3,1139\n", "no column that could be a force"),
         ("1\n2\n3\n4\n5\n6\n", "rises like a counter"),
         ("angle [deg]\n1\n2\n1\n", "no column that could be a force"),
+        ("peak [N]\nnan\nnan\n", r"a force \('peak', line 2: 'nan' is not a finite number\)"),
         ("a,b\n1,2\n1,2,3\n", "line 3 has 3 columns; allowed: 2"),
     ],
 )
@@ -110,16 +112,25 @@ def test_unusable_files_say_why(text, message, tmp_path):
 
 
 def test_a_column_is_taken_by_name_number_and_unit(tmp_path):
-    """``--column`` takes the name without its unit, or a number; ``--unit`` says what the file does not."""
+    """``--column`` takes the name without its unit, or a number; ``unit`` says what the file does not."""
     path = tmp_path / "two.csv"
     path.write_text("left,right\n1,2\n3,1\n2,2\n")
     assert choose_force(read_recording(path), "RIGHT").values.tolist() == [2.0, 1.0, 2.0]
     assert choose_force(read_recording(path), "1", "kN").values.tolist() == [1000.0, 3000.0, 2000.0]
     with pytest.raises(DiagnosisError, match="no column 'middle'; its columns of numbers: 'left', 'right'"):
         choose_force(read_recording(path), "middle")
+    with pytest.raises(DiagnosisError, match="no column 'lefft'; did you mean left"):
+        choose_force(read_recording(path), "lefft")
     assert choose_force(read_recording(path), "left", "V").unit == "V"
     with pytest.raises(DiagnosisError, match="'left' is in furlong, no unit that is known; allowed: N"):
         choose_force(read_recording(path), "left", "furlong")
+    path.write_text("shaft [m/s^2]\n1\n3\n2\n")
+    assert (
+        "column 'shaft' (N as stated, instead of m/s^2)" in choose_force(read_recording(path), "shaft", "N").described
+    )
+    path.write_text("peak [N]\nnan\nnan\n")
+    with pytest.raises(DiagnosisError, match=r"column 'peak', line 2: 'nan' is not a finite number"):
+        choose_force(read_recording(path), "peak")
 
 
 @pytest.mark.parametrize(
@@ -149,7 +160,7 @@ def test_what_is_no_calibration_is_refused(scale, tmp_path):
     """One line that says what is allowed."""
     path = tmp_path / "record.csv"
     path.write_text("Channel A [mV]\n1\n3\n2\n")
-    with pytest.raises(DiagnosisError, match=r"--scale .* (is no calibration|does not fit)"):
+    with pytest.raises(DiagnosisError, match=r"scale = .* (is no calibration|does not fit)"):
         choose_force(read_recording(path), scale=scale)
 
 
@@ -205,6 +216,40 @@ def test_files_that_are_no_recordings_say_so_in_one_line(name, tmp_path):
     with pytest.raises(DiagnosisError, match=name) as error:
         choose_force(read_recording(tmp_path / name))
     assert "\n" not in str(error.value)
+
+
+STAMPS = [f"12:{i // 60:02d}:{i % 60:02d};{i},5" for i in range(600)]
+
+LONG_TEXTS = {
+    "a footer": "t;force\n" + "".join(f"{i};{i % 7}\n" for i in range(600)) + "end\nof it\n",
+    "a further part": "t,f\n" + "".join(f"{i},{i % 7}\n" for i in range(300)) + "***\n" + "a,b\n1,2\n" * 40,
+    "a restart": 2 * ("t,force\n" + "".join(f"{i},{i % 7}\n" for i in range(300))),
+    "blank lines": "t\tforce\n" + "".join(f"{i}\t{i % 7}\n" + "\n" * (i % 5 == 0) for i in range(600)),
+    "instants": "t;force [N]\n" + "\n".join(STAMPS),
+    "instants that end": "t;force [N]\n" + "\n".join([*STAMPS, "later;3,5", "later;4"]),
+    "labels": "".join(f"t:{i},force:{i % 7}.5\n" for i in range(600)),
+    "missing readings": "force\n" + "".join(f"{i % 7 if i % 100 else 'OVR'}\n" for i in range(600)) + "\n\n",
+    "quotes": "t,force\n" + "".join(f'{i},"1,{i % 7}00.5"\n' for i in range(600)),
+    "text": "state,force\n" + "".join(f"on,{i % 7}\n" for i in range(600)),
+    "a wrong reading": "force\n" + "".join(f"{i % 7 if i != 450 else 'x'}\n" for i in range(600)),
+}
+
+
+@pytest.mark.parametrize("encoding", ["utf-8", "utf-16"])
+@pytest.mark.parametrize("name", LONG_TEXTS)
+def test_a_text_is_the_same_in_blocks_of_any_size(name, encoding, tmp_path, monkeypatch):
+    """Blocks of a hundred lines, as texts of many megabytes are read in, change no reading, line, problem or note."""
+    path = tmp_path / "record.csv"
+    path.write_text(LONG_TEXTS[name], encoding=encoding)
+    whole = read_recording(path)
+    monkeypatch.setattr(lines, "BLOCK", 1024)
+    parts = read_recording(path)
+    assert {key: values.tolist() for key, values in parts.columns.items()} == {
+        key: pytest.approx(values.tolist(), nan_ok=True) for key, values in whole.columns.items()
+    }
+    assert list(parts.lines) == list(whole.lines)
+    for field in ("form", "units", "problems", "texts", "rates"):
+        assert getattr(parts, field) == getattr(whole, field)
 
 
 @pytest.mark.skipif(not hasattr(os, "mkfifo"), reason="named pipes")

@@ -188,7 +188,7 @@ def test_a_sheet_is_named_by_an_option(tmp_path):
     path = tmp_path / "rig.xlsx"
     rows = [("peak [N]",), *((40.0 + place % 2,) for place in range(200))]
     workbook(path, One=[("peak [N]",), *rows[1:100]], Two=rows)
-    code, out, _ = run("judge", path, "--sheet", "Two", "--sensor-error", "0.1 N")
+    code, out, _ = run("judge", path, "--read", "sheet=Two", "--sensor-error", "0.1 N")
     assert (code, "Excel, sheet 'Two' of 'One', 'Two', column 'peak' (N), 200 readings" in out) == (0, True)
 
 

@@ -199,3 +199,69 @@ def test_impacts_that_are_sampled_too_slowly_have_no_types(swept_beam):
     found = run_up(*swept_beam(8_000.0), sensor_error=1.0)
     assert found.types is None
     assert any("peaks last hardly two samples" in note for note in found.notes)
+
+
+SWEPT = 5.0 * TIME + 35.0 / 80.0 * TIME**2
+"""Angle of a run-up from 5 to 40 turns a second."""
+
+
+def resonance(frequency, damping):
+    """Noise through an oscillator, of standard deviation 1."""
+    from scipy.signal import lfilter
+
+    turn, decay = 2.0 * np.pi * frequency / RATE, np.exp(-2.0 * np.pi * frequency * damping / RATE)
+    noise = np.random.default_rng(0).normal(size=len(TIME))
+    found = lfilter([1.0], [1.0, -2.0 * decay * np.cos(turn), decay**2], noise)
+    return found / found.std()
+
+
+def test_a_hum_is_a_fixed_frequency_and_no_order():
+    """50 Hz beside the first order: one order, and a line of 50 Hz with its amplitude at all speeds."""
+    value = 3.0 * np.cos(2.0 * np.pi * SWEPT) + np.sin(2.0 * np.pi * 50.0 * TIME)
+    found = run_up(value + 0.1 * np.random.default_rng(1).normal(size=len(TIME)), INSTANTS, turns(SWEPT))
+    assert [round(line.order, 2) for line in found.lines] == [1.0]
+    (hum,) = found.fixed
+    assert hum.frequency == pytest.approx(50.0, abs=0.2)
+    assert hum.amplitude == pytest.approx(1.0, rel=0.1)
+    assert hum.damping is None
+
+
+@pytest.mark.parametrize(("frequency", "damping"), [(60.0, 0.02), (150.0, 0.05), (300.0, 0.01)])
+def test_the_fixed_frequency_of_a_resonance_has_its_damping_and_no_orders(frequency, damping):
+    """The half-power width of a resonance is twice its damping times its frequency; orders beside it stay."""
+    alone = run_up(resonance(frequency, damping), INSTANTS, turns(SWEPT))
+    beside = run_up(resonance(frequency, damping) + 3.0 * np.cos(4.0 * np.pi * SWEPT), INSTANTS, turns(SWEPT))
+    assert alone.lines == ()
+    assert [round(line.order, 2) for line in beside.lines] == [2.0]
+    for found in (alone, beside):
+        (line,) = found.fixed
+        assert line.frequency == pytest.approx(frequency, rel=0.01)
+        assert line.damping == pytest.approx(damping, rel=0.35)
+        assert line.amplitude == pytest.approx(np.sqrt(2.0), rel=0.2)
+
+
+def test_an_order_through_a_resonance_is_no_fixed_frequency():
+    """What the machine itself excites passes the resonance at one speed and is none of the noise."""
+    ratio = 3.0 * np.gradient(SWEPT, TIME) / 60.0
+    size = 2.0 / np.sqrt((1.0 - ratio**2) ** 2 + (0.1 * ratio) ** 2)
+    noise = 0.1 * np.random.default_rng(1).normal(size=len(TIME))
+    found = run_up(size * np.cos(6.0 * np.pi * SWEPT) + noise, INSTANTS, turns(SWEPT))
+    assert [round(line.order, 2) for line in found.lines] == [3.0]
+    assert found.fixed == ()
+
+
+def test_pulses_missed_and_doubled_at_once_leave_speed_and_orders():
+    """5 % missed and 3 % doubled: the speed stays within 1 % of 5 to 40 turns a second, and no order is added."""
+    rng = np.random.default_rng(1)
+    pulses = np.interp(np.arange(int(SWEPT[-1]) + 1), SWEPT, TIME)
+    pulses = pulses[rng.random(len(pulses)) >= 0.05]
+    extra = pulses[rng.random(len(pulses)) < 0.03]
+    extra = extra + rng.uniform(0.1, 0.6, len(extra)) / np.interp(extra, TIME, np.gradient(SWEPT, TIME))
+    signal = np.zeros(len(TIME))
+    for instant in (*pulses, *extra):
+        signal[int(instant * RATE) + 1 :][:40] = 5.0
+    value = 3.0 * np.cos(2.0 * np.pi * SWEPT) + 1.5 * np.cos(3.0 * np.pi * SWEPT)
+    found = run_up(value + 0.3 * np.random.default_rng(2).normal(size=len(TIME)), INSTANTS, turns_of(signal, TIME))
+    assert [round(line.order, 2) for line in found.lines] == [1.0, 1.5]
+    assert found.speeds.max() == pytest.approx(2400.0, rel=0.01)
+    assert found.speeds.min() > 300.0

@@ -101,7 +101,7 @@ def universal(path, title, unit, values, binary=0, step=0.001):
     with warnings.catch_warnings():
         warnings.simplefilter("ignore", ResourceWarning)  # pyuff leaves its file to the collector
         pyuff.UFF(str(path)).write_sets(one, mode="add")
-        gc.collect()
+        gc.collect(0)
 
 
 def universal_binary(path, title, unit, values):

@@ -17,14 +17,14 @@ COMMAND = (
     "chaosgym",
     "sweep",
     "impact-beam",
+    "--fidelity",
+    "standard",
     "--axis",
     "excitation_frequency=10:30",
     "--axis",
     "clearance=5e-5:2e-4",
-    "--random",
-    str(POINTS),
-    "--seed",
-    "4",
+    "--sampling",
+    f"random:{POINTS}:4",
     "--budget",
     "100",
 )
@@ -97,7 +97,7 @@ def test_rows_of_a_cluster_that_loses_a_worker_are_those_of_one_process(cluster,
     """One of two workers is killed half way: nothing is lost, nothing twice, and every row is the local run's."""
     address, workers, _ = cluster
     run = subprocess.Popen(
-        [*COMMAND, "--scheduler", address, "--out", str(tmp_path / "c")], stdout=subprocess.PIPE, stderr=subprocess.PIPE
+        [*COMMAND, "--workers", address, "--out", str(tmp_path / "c")], stdout=subprocess.PIPE, stderr=subprocess.PIPE
     )
     wait_until(lambda: list(tmp_path.glob("c/chunks/0*.parquet")), 400.0)
     workers[0].kill()
@@ -111,7 +111,7 @@ def test_rows_of_a_cluster_that_loses_a_worker_are_those_of_one_process(cluster,
 
 def test_a_missing_scheduler_is_one_line(tmp_path):
     """Nobody listens at port 1: exit code 2, the address is named, and the folder can be used without a cluster."""
-    command = [*COMMAND, "--scheduler", "tcp://127.0.0.1:1", "--out", str(tmp_path / "c")]
+    command = [*COMMAND, "--workers", "tcp://127.0.0.1:1", "--out", str(tmp_path / "c")]
     run = subprocess.run(command, capture_output=True, text=True)
     assert run.returncode == 2
     assert "no Dask scheduler answers at tcp://127.0.0.1:1" in run.stderr
@@ -124,7 +124,7 @@ def test_a_dead_scheduler_is_one_line(cluster, tmp_path):
     """Killed while its workers compute: exit code 1, one line beside the progress, the plan stays."""
     address, _, scheduler = cluster
     run = subprocess.Popen(
-        [*COMMAND, "--scheduler", address, "--out", str(tmp_path / "c")], stdout=subprocess.PIPE, stderr=subprocess.PIPE
+        [*COMMAND, "--workers", address, "--out", str(tmp_path / "c")], stdout=subprocess.PIPE, stderr=subprocess.PIPE
     )
     wait_until((tmp_path / "c" / "chunks").is_dir)
     time.sleep(1.0)

@@ -137,6 +137,11 @@ def test_plans_survive_their_settings():
     without_search = {name: value for name, value in plan.settings().items() if name != "initial_states"}
     assert SweepPlan.from_settings(without_search) == replace(plan, initial_states=3)
     assert replace(plan, initial_states=3).settings() == without_search
+    without_definition = {name: value for name, value in plan.settings().items() if name != "definition"}
+    assert SweepPlan.from_settings(without_definition) == replace(plan, definition="thesis")
+    assert replace(plan, definition="thesis").settings() == without_definition
+    with pytest.raises(ParameterError, match="definition = 'mine' is unknown; allowed: settled, thesis"):
+        replace(plan, definition="mine")
     with pytest.raises(ParameterError, match="sampling = 'lattice' is unknown; allowed: grid, random, sobol, crosses"):
         SweepPlan.from_settings(plan.settings() | {"sampling": "lattice"})
 
@@ -182,11 +187,11 @@ def test_a_point_counts_the_points_of_its_tolerances():
         ("clearance=a:b:3", "not of the form"),
         ("clearance=3e-5:1e-5:4", "^axis clearance = 3e-05:1e-05 is empty or reversed"),
         ("clearance=0:1e-5:4:log", "can't be logarithmic"),
-        ("clearance=0:1e-5:1", "1 points; allowed: 2 to 1000000"),
-        ("clearance=0:1e-5:1000001", "1000001 points; allowed: 2 to 1000000"),
+        ("clearance=0:1e-5:1", "count of axis clearance = 1 is out of range"),
+        ("clearance=0:1e-5:1000001", "count of axis clearance = 1000001 is out of range"),
         ("clearance=1e-5:1e-5", "empty or reversed"),
-        ("clearance=1e-5:inf", "empty or reversed"),
-        ("clearance=nan:1e-5", "empty or reversed"),
+        ("clearance=1e-5:inf", "high end of axis clearance = inf is out of range; allowed: a finite number"),
+        ("clearance=nan:1e-5", "low end of axis clearance = nan is out of range; allowed: a finite number"),
         ("clearance=1e-5:3e-5:4:4", "not of the form"),
         ("clearance=1e-5:3e-5:", "not of the form"),
         ("=clearance=1e-5:3e-5", "not of the form"),
@@ -213,7 +218,7 @@ def test_an_unknown_scale_is_refused():
         ((Axis("clearance", 1e-5, 3e-5),), {}, "needs a COUNT"),
         ((CLEARANCE,), {"sampling": "random", "size": 5}, "takes no COUNT"),
         ((Axis("damping_family", 0.0, 1.0, 2),), {}, "is a choice"),
-        ((CLEARANCE,), {"budget": 50}, "budget = 50 cycles"),
+        ((CLEARANCE,), {"budget": 50}, "budget = 50 is out of range"),
         ((CLEARANCE,), {"signals": 1.5}, r"signals = 1.5 is out of range"),
         ((), {"sampling": "crosses", "size": 2}, "axes .none."),
     ],

@@ -16,11 +16,13 @@ import pytest
 
 import chaosgym.sweeps.label as label_module
 import chaosgym.sweeps.plan as plan_module
+import chaosgym.sweeps.types_by_default as types_by_default
 from chaosgym.diagnosis import diagnose, response_type
 from chaosgym.errors import DatasetError, SimulationError, UnfinishedError
 from chaosgym.machines import ImpactBeam
 from chaosgym.simulation import simulate
 from chaosgym.sweeps import Axis, SweepPlan, read_sweep, relabel, run_sweep
+from chaosgym.sweeps.folder import SweepFolder
 from tests.plain_modes import PLAIN_BEAM
 
 PLAN = SweepPlan(
@@ -74,6 +76,30 @@ def test_rows_are_what_simulation_and_diagnosis_say(swept):
     assert row["horizon"] == 100
     exponent = verdict.evidence["largest_lyapunov_exponent_per_cycle"]
     assert row["exponent"] == np.float32(exponent["value"])
+
+
+@pytest.mark.parametrize("definition", ["settled", "thesis"])
+def test_rows_say_whose_nature_they_have(tmp_path, definition):
+    """A beam whose chaos dies out is periodic, and chaotic by the thesis' definition (5.2.3); the file states which."""
+    beam = replace(PLAIN_BEAM, clearance=0.158e-3, damping_ratio=0.028)
+    axes = (Axis("excitation_frequency", 12.0, 27.2, 2),)
+    sweep = run_sweep(SweepPlan(beam, axes, full_types=1.0, initial_states=1, definition=definition), tmp_path / "s")
+    verdict = diagnose(replace(beam, excitation_frequency=27.2), budget=400).labelled(definition)
+    assert sweep.column("nature").tolist() == ["periodic", verdict.nature]
+    assert sweep.column("status").tolist() == ["certified", verdict.status]
+    assert sweep.column("transient_chaos").tolist() == [0, verdict.transient_chaos]
+    assert verdict.transient_chaos > 50
+    assert sweep.column("headline")[1] == verdict.statement.headline
+    assert (verdict.nature == "chaotic") == (definition == "thesis")
+    beside = response_type(
+        replace(beam, excitation_frequency=27.2), budget=400, initial_states=1, definition=definition, workers=1
+    )
+    assert beside.reason.startswith("the nominal response is chaotic") == (definition == "thesis")
+    assert sweep.column("response_type")[1] == beside.type
+    assert sweep.definition == definition
+    assert SweepPlan.from_settings(sweep.settings).definition == definition
+    meaning = sweep.table.schema.field("nature").metadata[b"meaning"].decode()
+    assert ("thesis 5.2.3" in meaning) == (definition == "thesis")
 
 
 def test_signals_are_the_cycles_of_the_run_from_rest(crosses):
@@ -187,11 +213,11 @@ def test_stopped_sweep_goes_on_and_ends_with_the_same_rows(swept, tmp_path, monk
     computed = []
     honest = label_module.label_point
 
-    def interrupted(machine, budget, *, signals):
+    def interrupted(machine, budget, **how):
         if len(computed) == 9:
             raise KeyboardInterrupt
         computed.append(machine)
-        return honest(machine, budget, signals=signals)
+        return honest(machine, budget, **how)
 
     monkeypatch.setattr(label_module, "label_point", interrupted)
     with pytest.raises(KeyboardInterrupt):
@@ -214,7 +240,7 @@ def test_ctrl_c_ends_the_other_threads_at_their_row(tmp_path, monkeypatch):
     """One thread is interrupted; the other, at the first of its many rows, ends with it rather than with its chunk."""
     rows, interrupted = [], threading.Event()
 
-    def slow(machine, budget, *, signals):
+    def slow(machine, budget, **_):
         rows.append(machine)
         if len(rows) == 1:
             interrupted.wait(30.0)
@@ -263,14 +289,14 @@ def test_a_killed_sweep_goes_on(tmp_path):
         "chaosgym",
         "sweep",
         "impact-beam",
+        "--fidelity",
+        "standard",
         "--axis",
         "excitation_frequency=10:30",
         "--axis",
         "clearance=5e-5:2e-4",
-        "--sobol",
-        "900",
-        "--seed",
-        "2",
+        "--sampling",
+        "sobol:900:2",
         "--budget",
         "100",
         "--out",
@@ -357,3 +383,18 @@ def test_other_settings_and_foreign_folders_are_refused(swept, tmp_path):
     (folder.parent / "damaged" / "sweep.parquet").write_bytes(b"PAR1 no")
     with pytest.raises(DatasetError, match="can't be read"):
         read_sweep(folder.parent / "damaged")
+
+
+def test_types_that_take_long_are_left_to_the_user(tmp_path, monkeypatch):
+    """The choice is made by the expected time, and a folder keeps the choice that it was begun with."""
+    plan = SweepPlan(PLAIN_BEAM, (Axis("excitation_frequency", 10.0, 20.0, 3),))
+    monkeypatch.setattr(types_by_default, "full_type", lambda machine, plan: None)
+    quick = types_by_default.with_affordable_types(plan, tmp_path)
+    assert quick.plan.full_types == 1.0
+    assert quick.seconds < 1.0
+    monkeypatch.setattr(types_by_default, "AFFORDABLE", 0.0)
+    slow = types_by_default.with_affordable_types(plan, tmp_path)
+    assert slow.plan == plan
+    assert slow.seconds > 0.0
+    SweepFolder(tmp_path, quick.plan, "1")
+    assert types_by_default.with_affordable_types(plan, tmp_path) == (quick.plan, None)

@@ -10,7 +10,7 @@ from chaosgym.machines.parameters import parameters_of
 from tests.plain_modes import PLAIN_BEAM
 from thesis.scorecard import firmness
 from thesis.scorecard.findings import Finding
-from thesis.scorecard.firmness import Firmness, exclusive_pairs, left_out_hits, neighbour_shares, nudged, shifted
+from thesis.scorecard.firmness import Firmness, exclusive_pairs, judge_neighbours, left_out_hits, nudged, shifted
 from thesis.scorecard.scorecard import Scorecard
 from thesis.scorecard.verdicts import judge
 from thesis.statements import read_comparisons
@@ -42,7 +42,19 @@ def test_a_scale_is_firm_and_a_wrong_nature_is_not(monkeypatch):
     loose = replace(frequency, tolerance=frequency.tolerance._replace(relative=0.02))
     asked = (loose, replace(COMPARED["IBS-013"], printed="odd"))
     monkeypatch.setattr(firmness, "statements_of", lambda name, joint: asked)
-    assert neighbour_shares(PLAIN_BEAM, 3, workers=1) == {"IBS-034": 1.0, "IBS-013": 0.0}
+    judged = judge_neighbours(PLAIN_BEAM, 3, workers=1)
+    assert judged == Firmness({"IBS-034": 1.0, "IBS-013": 0.0}, (1, 1, 1))
+    assert judged.firm == ("IBS-034",)
+
+
+def test_the_interval_of_the_expected_hits_is_students():
+    """Of 12, 14 and 16 hits the mean is 14, and 4.303 standard errors of 2 / sqrt(3) lie on either side."""
+    assert Firmness({}, (12, 14, 16)).expected == pytest.approx((14.0, 14.0 - 4.968, 14.0 + 4.968), abs=1e-3)
+
+
+def test_half_of_the_neighbours_make_a_hit_firm():
+    """A half is enough, less is luck."""
+    assert Firmness({"a": 0.5, "b": 0.49, "c": 1.0}, (2, 1)).firm == ("a", "c")
 
 
 def test_statements_that_no_candidate_hits_together_exclude_each_other():
@@ -67,7 +79,7 @@ def test_what_is_kept_holds_for_the_same_constants_alone(tmp_path, monkeypatch):
     """Another constant, and nothing is known; the scorecard then says so."""
     monkeypatch.setattr(firmness, "KEPT", tmp_path / "firmness.json")
     firmness._kept.cache_clear()
-    found = Firmness({"IBS-013": 0.25}, 4, (("IBS-013", "IBS-014"),), (3, 5))
+    found = Firmness({"IBS-013": 0.25}, (0, 0, 0, 1), (("IBS-013", "IBS-014"),), (3, 5))
     firmness.keep(PLAIN_BEAM, found)
     assert firmness.firmness_of(PLAIN_BEAM) == found
     assert firmness.firmness_of(replace(PLAIN_BEAM, width=0.02)) is None
@@ -75,13 +87,15 @@ def test_what_is_kept_holds_for_the_same_constants_alone(tmp_path, monkeypatch):
 
 
 def test_the_headline_has_four_numbers():
-    """Hits, hits left out, hits to expect of a neighbour, and pairs that exclude each other."""
+    """Firm hits, hits left out, hits to expect of a neighbour, and pairs that exclude each other."""
     judged = tuple(judge(COMPARED[name], [Finding("periodic")]) for name in ("IBS-013", "IBS-046"))
-    known = Firmness({"IBS-013": 0.25, "IBS-046": 0.5}, 4, (("IBS-013", "IBS-046"),), (3, 5))
+    known = Firmness({"IBS-013": 0.25, "IBS-046": 0.5}, (1, 1, 0, 1), (("IBS-013", "IBS-046"),), (3, 5))
     told = Scorecard(judged, {"impact-beam": known}).as_dict()
     assert [one["neighbours"] for one in told["targets"]] == [0.25, 0.5]
     totals = told["totals"]["impact-beam"]
     assert totals["all"] == {"hit": 2, "near": 0, "miss": 0, "contradictory": 0, "total": 2}
     assert totals["left_out"] == {"hit": 3, "total": 5}
-    assert (totals["expected"], totals["exclusive"]) == (0.75, [["IBS-013", "IBS-046"]])
+    assert totals["firm"] == {"hit": 1, "total": 2}
+    assert totals["expected"]["mean"] == 0.75
+    assert totals["exclusive"] == [["IBS-013", "IBS-046"]]
     assert Scorecard(judged).totals()["impact-beam"]["expected"] is None

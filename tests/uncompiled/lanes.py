@@ -139,6 +139,13 @@ def add_rows(own, at, factor, sum_at, width):
 
 
 @operation
+def add_sums(own, at, width, count, factors_at, factor, sum_at):
+    """Sum of rows times factors, times a factor, added to numbers."""
+    answer = own[factors_at : factors_at + count] @ _taken(own, at, count, width)
+    own[sum_at : sum_at + width] += factor * answer
+
+
+@operation
 def multiply_eight(own, at, rows, matrix, width, count, out_at):
     """Eight products of rows and a matrix."""
     columns = _taken(own, matrix, count, width // LANES, LANES)

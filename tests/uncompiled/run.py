@@ -40,7 +40,7 @@ def results():
         record = chaosgym.simulate(machine, 2, samples_per_cycle=3)
         found |= {f"{name}, {field}": getattr(record, field) for field in RECORDED}
         found[f"{name}, history"] = record.history
-        if machine.carries_deviations:
+        if machine.moving.deviations:
             vectors = np.eye(len(record.section[0]))[:2]
             found[f"{name}, deviations"] = simulate_with_deviations(machine, 1, deviations=vectors)[1]
     fixed = chaosgym.RungeKutta4(steps_per_cycle=2000)

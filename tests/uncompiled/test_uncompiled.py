@@ -1,5 +1,6 @@
 """Kernels mean what their Python source says: run as it stands, without numba, it gives what machine code gives."""
 
+import json
 import os
 import subprocess
 import sys
@@ -7,7 +8,10 @@ import sys
 import numpy as np
 import pytest
 from numba import njit
+from numba.core.extending import _Intrinsic
 
+import chaosgym.core.binned.lanes
+import chaosgym.core.lanes
 from tests.uncompiled.lanes import OPERATIONS, compiled
 from tests.uncompiled.run import results
 
@@ -25,6 +29,7 @@ CALLS = {
     "copy": lambda call, table, own: call(own, 3, 600, 13),
     "dot_of_distances": lambda call, table, own: call(table, 0, own, 100, 200, 24),
     "add_rows": lambda call, table, own: call(own, 3, 0.3, 600, 16),
+    "add_sums": lambda call, table, own: call(own, 0, 16, 5, 700, 0.3, 900),
     "multiply_eight": lambda call, table, own: call(own, 0, 3, 200, 48, 5, 600),
     "next_terms_of_eight": lambda call, table, own: call(own, 0, 250, 400, 56, 3, 2.0, 0.25, 600),
     "deal": lambda call, table, own: call(table, 0, 24, 5, own, 600, 30, 7, 6),
@@ -61,6 +66,13 @@ def test_a_vector_operation_is_its_sentence_in_numpy(name):
     np.testing.assert_allclose(found[0], found[1], rtol=1e-12, atol=1e-12)
 
 
+def test_every_vector_operation_has_its_sentence_in_numpy():
+    """None is left out of the tests above, nor of the run without the compiler below."""
+    modules = (chaosgym.core.lanes, chaosgym.core.binned.lanes)
+    defined = {name for module in modules for name, value in vars(module).items() if isinstance(value, _Intrinsic)}
+    assert defined == set(OPERATIONS) == set(CALLS)
+
+
 @pytest.mark.slow
 def test_kernels_run_as_plain_python(tmp_path):
     """Records of every scene, deviations and steps of the tasks are those of machine code, but for rounding."""
@@ -72,3 +84,53 @@ def test_kernels_run_as_plain_python(tmp_path):
     assert set(plain) == set(compiled)
     for name, value in compiled.items():
         np.testing.assert_allclose(plain[name], value, rtol=0.0, atol=1e-7 * np.nanmax(np.abs(value)), err_msg=name)
+
+
+WITHOUT = os.environ | {"NUMBA_DISABLE_JIT": "1"}
+SAYS = "NUMBA_DISABLE_JIT is set, and kernels run as machine code only; unset it\n"
+
+
+@pytest.mark.parametrize("command", ["simulate impact-beam --cycles 1", "diagnose slider-crank"])
+def test_a_command_without_the_compiler_says_so(command):
+    """Machine code has operations that plain Python has not: one line, exit 2."""
+    words = [sys.executable, "-m", "chaosgym", *command.split()]
+    done = subprocess.run(words, env=WITHOUT, capture_output=True, text=True)
+    assert done.returncode == 2
+    assert done.stderr == f"Error: {SAYS}"
+
+
+@pytest.mark.parametrize("words", [["docs/data/periodic.csv", "--sensor-error", "1 N"], ["--budget-us", "0"]])
+def test_classifying_one_record_or_parameters_loads_no_machine_code(words):
+    """The kernels of the classifier only compute: their Python answers sooner than machine code is loaded."""
+    command = [sys.executable, "-m", "chaosgym", "classify", "impact-beam", *words, "--json"]
+    done = subprocess.run(command, capture_output=True, text=True)
+    assert done.returncode == 0, done.stderr
+    assert json.loads(done.stdout)
+
+
+def test_python_without_the_compiler_says_so():
+    """One cycle, and the reset of one environment and of two: an error of this package, which names the variable."""
+    program = """
+import gymnasium, chaosgym
+name = "chaosgym/ImpactBeamTolerance-v1"
+for work in (
+    lambda: chaosgym.simulate(chaosgym.ImpactBeam(), 1),
+    lambda: gymnasium.make(name).reset(seed=1),
+    lambda: gymnasium.make_vec(name, num_envs=2).reset(seed=1),
+):
+    try:
+        work()
+    except chaosgym.ParameterError as error:
+        print(error)
+"""
+    done = subprocess.run([sys.executable, "-c", program], env=WITHOUT, capture_output=True, text=True)
+    assert (done.returncode, done.stderr) == (0, "")
+    assert done.stdout == 3 * SAYS
+
+
+def test_the_switch_set_to_zero_changes_nothing():
+    """NUMBA_DISABLE_JIT=0 compiles as if it were not there."""
+    program = "import chaosgym; print(len(chaosgym.simulate(chaosgym.ImpactBeam(), 1).peak_force))"
+    where = WITHOUT | {"NUMBA_DISABLE_JIT": "0"}
+    done = subprocess.run([sys.executable, "-c", program], env=where, capture_output=True, text=True)
+    assert (done.returncode, done.stdout) == (0, "1\n"), done.stderr

@@ -7,6 +7,7 @@ from thesis.cli.calibrate import calibrate
 from thesis.cli.exclusions import exclusions
 from thesis.cli.figures import figures
 from thesis.cli.firmness import firmness
+from thesis.cli.numerics import numerics
 from thesis.cli.scorecard import scorecard
 
 
@@ -15,7 +16,7 @@ def app() -> None:
     """The statements and figures of the thesis, computed on the machines of chaosgym."""
 
 
-for command in (scorecard, figures, calibrate, firmness, exclusions):
+for command in (scorecard, figures, calibrate, firmness, exclusions, numerics):
     app.add_command(command)
 
 

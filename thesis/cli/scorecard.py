@@ -79,14 +79,20 @@ def _count(group: str, count: dict[str, int]) -> str:
 
 def _firm(totals: dict[str, Any]) -> list[str]:
     """The headline's other numbers, as far as they are known."""
-    left_out, expected, pairs = totals["left_out"], totals["expected"], totals["exclusive"]
+    left_out, pairs = totals["left_out"], totals["exclusive"]
     unknown = "not known for these constants: python -m thesis firmness"
     said = f"{left_out['hit']} of {left_out['total']} hit" if left_out["total"] else unknown
     return [
         f"  {'left out':12s} {said}",
-        f"  {'expected':12s} {unknown if expected is None else f'{expected:.1f} hits of a neighbour'}",
+        f"  {'firm':12s} {_firm_hits(totals) if totals['firm'] else unknown}",
         f"  {'exclusive':12s} {', '.join(' x '.join(pair) for pair in pairs) or '-'}",
     ]
+
+
+def _firm_hits(totals: dict[str, Any]) -> str:
+    firm, expected = totals["firm"], totals["expected"]
+    mean = f"{expected['mean']:.1f} ({expected['low']:.1f} to {expected['high']:.1f})"
+    return f"{firm['hit']} of {firm['total']} hit by at least half of the neighbours; one neighbour hits {mean}"
 
 
 def _target(one: dict[str, Any]) -> str:

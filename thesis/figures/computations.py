@@ -17,7 +17,8 @@ from chaosgym.errors import SimulationError
 from chaosgym.machines import ImpactBeam, Machine
 from chaosgym.machines.parameters import with_settings
 from chaosgym.series import two_step_test
-from chaosgym.simulation import CycleRecord, parallel_map, simulate
+from chaosgym.simulation import CycleRecord, simulate
+from chaosgym.simulation.parallel import parallel_map
 from thesis.scorecard.beam_runs import follow_modes
 from thesis.scorecard.observation import READING_ERROR, THOROUGH, observe, plotted_peaks, read_dots
 

@@ -12,7 +12,7 @@ from chaosgym.machines.impact_beam.modes import modal_analysis
 from chaosgym.series import two_step_test
 from chaosgym.series.stroboscopic import find_recurrence, scales
 from chaosgym.simulation import CycleRecord, simulate
-from thesis.scorecard.observation import DOT, READING_ERROR, initial_state, plotted_peaks
+from thesis.scorecard.observation import DOT, READING_ERROR, Effort, plotted_peaks
 
 MOTION_CYCLES, MOTION_SAMPLES = 50, 4000
 """Cycles of a long history, and samples in each."""
@@ -29,7 +29,8 @@ def long_run(machine: Machine, cycles: int, start: int = 0) -> dict[str, Any]:
         ``irregular_cycles``: cycles before the plotted peaks repeat within the reading error, all if they never do;
         ``period`` that they repeat with, None if they don't; ``nature`` of the whole run by the Two-Step Test.
     """
-    peaks = plotted_peaks(simulate(machine, cycles, initial_state(machine, start)))[:, None]
+    state = Effort(0, cycles, 0, start=start).initial_state(machine)
+    peaks = plotted_peaks(simulate(machine, cycles, state))[:, None]
     nature = two_step_test(peaks, sensor_error=READING_ERROR).nature
     tail = peaks[-100:]
     scale = scales(tail)

@@ -1,7 +1,8 @@
 """How firm each verdict is: the share of neighbours that hit, statements that exclude each other, and figures left out.
 
 A neighbour is the machine with every fitted or assumed constant up to 1 % off, run at speeds up to half a step of the
-printed grid off, from another initial state. A statement that few neighbours hit is luck, in either direction.
+printed grid off, from another initial state. A statement that at least half of the neighbours hit is a firm hit; one
+that few hit is luck.
 Neighbours are judged by hasty runs. The numbers are kept in ``firmness.json``, which names the machine they hold for:
 ``python -m thesis firmness`` writes it anew.
 """
@@ -15,6 +16,7 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+from scipy.stats import t as student
 from tqdm import tqdm
 
 from chaosgym.errors import DatasetError, ParameterError
@@ -35,6 +37,9 @@ NUDGE = 0.01
 GRID = {"impact-beam": 1.0, "slider-crank": 10.0}
 """Steps of the thesis' sweeps over the speed [Hz, rpm] (3.5.1, 4.5.1)."""
 
+FIRM = 0.5
+"""Share of the neighbours that hit a firm hit, at least."""
+
 RARE, EXPECTED = 0.25, 8.0
 """Statements exclude each other if less than this share of the expected number of candidates, at least so many, hit
 both."""
@@ -48,8 +53,8 @@ class Firmness:
     ----------
     neighbours
         Share of the neighbours that hit, by statement; of those statements that were asked.
-    count
-        Number of neighbours.
+    hits
+        Number of these statements that each neighbour hits.
     exclusive
         Pairs of statements that no candidate of the search hit together, or hardly any.
     left_out
@@ -57,9 +62,22 @@ class Firmness:
     """
 
     neighbours: Mapping[str, float]
-    count: int
+    hits: tuple[int, ...]
     exclusive: tuple[tuple[str, str], ...] = ()
     left_out: tuple[int, int] = (0, 0)
+
+    @property
+    def firm(self) -> tuple[str, ...]:
+        """Statements that at least half of the neighbours hit."""
+        return tuple(name for name, share in self.neighbours.items() if share >= FIRM)
+
+    @property
+    def expected(self) -> tuple[float, float, float]:
+        """Hits to expect of a neighbour, and the ends of the 95 % interval of that mean (Student's t)."""
+        count, mean = len(self.hits), float(np.mean(self.hits))
+        error = float(np.std(self.hits, ddof=1)) / count**0.5
+        half = float(student.ppf(0.975, count - 1)) * error
+        return mean, mean - half, mean + half
 
 
 def fingerprint(machine: Machine) -> str:
@@ -80,14 +98,14 @@ def firmness_of(machine: Machine) -> Firmness | None:
     if entry is None or entry["machine"] != fingerprint(machine):
         return None
     pairs = tuple((one, other) for one, other in entry["exclusive"])
-    return Firmness(entry["neighbours"], entry["count"], pairs, tuple(entry["left_out"]))
+    return Firmness(entry["neighbours"], tuple(entry["hits"]), pairs, tuple(entry["left_out"]))
 
 
 def keep(machine: Machine, found: Firmness) -> None:
     """Write what was found into ``firmness.json``."""
     entry = {
         "machine": fingerprint(machine),
-        "count": found.count,
+        "hits": list(found.hits),
         "neighbours": {name: round(share, 3) for name, share in found.neighbours.items()},
         "exclusive": [list(pair) for pair in found.exclusive],
         "left_out": list(found.left_out),
@@ -97,32 +115,48 @@ def keep(machine: Machine, found: Firmness) -> None:
     _kept.cache_clear()
 
 
-def neighbour_shares(
+def judge_neighbours(
     machine: Machine,
     count: int,
     *,
     joint: str | None = None,
     seed: int = 0,
+    folder: Path | None = None,
     workers: int | None = None,
     progress: bool = False,
-) -> dict[str, float]:
-    """Share of the neighbours of a machine that hit each statement; contradictory ones are left out.
+) -> Firmness:
+    """Judge the neighbours of a machine on each statement; contradictory ones are left out.
 
-    Of statements with clearance in one ``joint``, "slider" or "ball", if it is named.
+    Parameters
+    ----------
+    machine
+        The machine whose neighbours are judged.
+    count
+        Number of neighbours, at least two.
+    joint
+        "slider" or "ball": only statements with clearance in that joint.
+    seed
+        Of the neighbours' constants, speeds and initial states.
+    folder
+        Where results of runs are kept, so that an interrupted call resumes; None keeps none.
+    workers
+        Number of threads; all processors by default.
+    progress
+        Show a progress bar on standard error.
     """
     asked = statements_of(machine.name, joint)
-    hits = {one.id: 0 for one in asked}
     effort = QUICK[machine.name]
+    hit = np.zeros((count, len(asked)), dtype=bool)
     for k in tqdm(range(count), desc="neighbours", disable=not progress, unit="machine"):
         rng = np.random.default_rng((seed, k))
         nearby = nudged(machine, rng)
         shift = float(rng.uniform(-0.5, 0.5)) * GRID[machine.name]
         moved = [shifted(one, machine.speed_field, shift) for one in asked]
         efforts = {machine.name: effort._replace(start=1 + k)}
-        judged = evaluate(moved, {machine.name: nearby}, efforts=efforts, workers=workers)
-        for one in judged:
-            hits[one.comparison.id] += one.verdict == "hit"
-    return {name: hit / count for name, hit in hits.items()}
+        judged = evaluate(moved, {machine.name: nearby}, efforts=efforts, folder=folder, workers=workers)
+        hit[k] = [one.verdict == "hit" for one in judged]
+    shares = dict(zip((one.id for one in asked), hit.mean(axis=0).tolist(), strict=True))
+    return Firmness(shares, tuple(hit.sum(axis=1).tolist()))
 
 
 def nudged(machine: Machine, rng: np.random.Generator) -> Machine:

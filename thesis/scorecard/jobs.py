@@ -7,7 +7,7 @@ from typing import Any, NamedTuple
 
 from chaosgym.machines import Machine
 from chaosgym.machines.parameters import parameters_of
-from chaosgym.simulation import parallel_map
+from chaosgym.simulation.parallel import parallel_map
 from thesis.cache import kept_values
 from thesis.scorecard.observation import Effort, Observation, observe
 
@@ -22,7 +22,7 @@ class Job(NamedTuple):
     settings: tuple[float | str, ...] = ()
 
 
-def observation(machine: Machine, *effort: int) -> dict[str, Any]:
+def observation(machine: Machine, *effort: Any) -> dict[str, Any]:
     """What a figure of the thesis would show of a machine; see ``Observation``."""
     return observe(machine, Effort(*effort)).as_dict()
 

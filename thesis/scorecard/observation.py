@@ -6,6 +6,7 @@ periodic, a few are a subharmonic, a distribution is chaos. Two dots closer than
 ``READING_ERROR`` is half that width, for every figure. What our own diagnosis says of the machine stands beside it.
 """
 
+import math
 from collections.abc import Mapping
 from dataclasses import asdict, dataclass, replace
 from typing import Any, NamedTuple
@@ -16,6 +17,7 @@ from chaosgym.arrays import Array
 from chaosgym.diagnosis import diagnose
 from chaosgym.errors import SimulationError
 from chaosgym.machines import ImpactBeam, Machine
+from chaosgym.machines.integrators import ExactEvents, RungeKutta4
 from chaosgym.series import Diagnosis, two_step_test
 from chaosgym.series.stroboscopic import MIN_REPEATS, class_residuals, irregularity
 from chaosgym.simulation import CycleRecord, MotionState, simulate
@@ -37,7 +39,8 @@ class Effort(NamedTuple):
     """How long a run is: cycles skipped, cycles recorded, and those of the diagnosis beside it (0: none).
 
     A ``hasty`` run ends as soon as its dots repeat closely. ``start`` cycles at a speed 5 % higher give the initial
-    state, which is rest in the middle after none.
+    state, which is rest in the middle after none. A ``step`` [us] is a fixed one of Runge-Kutta's, as the thesis may
+    have taken (5.2.2); 0 stands for exact contacts.
     """
 
     transient: int
@@ -45,6 +48,18 @@ class Effort(NamedTuple):
     budget: int
     hasty: int = 0
     start: int = 0
+    step: float = 0.0
+
+    def simulate(self, machine: Machine, cycles: int, state: MotionState | None = None) -> CycleRecord:
+        """Cycles of a machine from a state, or from rest."""
+        integrator = RungeKutta4(math.ceil(1e6 * machine.cycle_period / self.step)) if self.step else ExactEvents()
+        return simulate(machine, cycles, state, integrator=integrator)
+
+    def initial_state(self, machine: Machine) -> MotionState | None:
+        """State after ``start`` cycles at a speed 5 % higher; None, which is rest, after none."""
+        if not self.start:
+            return None
+        return self.simulate(machine.at(1.05 * getattr(machine, machine.speed_field)), self.start).final_state
 
 
 THOROUGH: Mapping[str, Effort] = {"impact-beam": Effort(200, 100, 800), "slider-crank": Effort(60, 50, 200)}
@@ -144,8 +159,8 @@ def observe(machine: Machine, effort: Effort) -> Observation:
     if effort.hasty:
         return _glance(machine, effort)
     try:
-        record = simulate(machine, effort.transient + effort.cycles, initial_state(machine, effort.start))
-        certificate = diagnose(machine, budget=effort.budget).nature if effort.budget else ""
+        record = effort.simulate(machine, effort.transient + effort.cycles, effort.initial_state(machine))
+        certificate = diagnose(machine, budget=effort.budget).labelled("thesis").nature if effort.budget else ""
     except SimulationError:
         return Observation("failed")
     settled = record.after(effort.transient)
@@ -173,20 +188,13 @@ def _watched(plotted: Array, transient: int, certificate: str, bounce_share: flo
     )
 
 
-def initial_state(machine: Machine, cycles: int) -> MotionState | None:
-    """State after some cycles at a speed 5 % higher; None, which is rest, after none."""
-    if not cycles:
-        return None
-    return simulate(machine.at(1.05 * getattr(machine, machine.speed_field)), cycles).final_state
-
-
 def _glance(machine: Machine, effort: Effort) -> Observation:
     """What a hasty run shows: no longer than needed where the response settles soon; nature and forces alone."""
     blocks, least, cycles = list[Array](), np.inf, 0
     try:
-        state = initial_state(machine, effort.start)
+        state = effort.initial_state(machine)
         while least > CLOSE and cycles < effort.transient + effort.cycles:
-            record = simulate(machine, BLOCK, state)
+            record = effort.simulate(machine, BLOCK, state)
             state, cycles = record.final_state, cycles + BLOCK
             blocks.append(_plotted_sides(record))
             least = max(irregularity(peaks, 3) for peaks in blocks[-1][-REPEATING:].T)

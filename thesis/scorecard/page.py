@@ -17,7 +17,8 @@ are those of one dot a cycle, as the thesis plots them: of the beam on one side 
 single response; of the crank's joints the larger of both sides.
 
 *Neighbours* are the share of machines that hit a statement with every constant that is not in print up to 1 % off,
-at speeds up to half a step of the printed grid off, from another initial state. What few neighbours hit is luck.
+at speeds up to half a step of the printed grid off, from another initial state. A *firm hit* is hit by at least half
+of the neighbours; what few of them hit is luck.
 What was tried: [calibration](calibration.md).
 """
 
@@ -30,10 +31,9 @@ def page(card: Scorecard) -> str:
 
 
 def _section(card: Scorecard, machine: str) -> str:
-    hits, count = card.hit_rate(machine)
     lines = [
         f"## {machine}\n",
-        f"Hits: {hits} of {count} ({hits / count:.0%}). {_firm(card, machine)}\n",
+        f"{_firm(card, machine)}\n",
         "| statement | figure | what | printed | here | verdict | neighbours | found |",
         "|---|---|---|---|---|---|---|---|",
     ]
@@ -64,10 +64,15 @@ def _exclusions(hit: Set[str]) -> str:
 def _firm(card: Scorecard, machine: str) -> str:
     """What is known beside the bare hits, in words."""
     known, totals = card.firmness.get(machine), card.totals()[machine]
+    hits, count = card.hit_rate(machine)
+    bare = f"The machine itself hits {hits} of {count}."
     if known is None:
-        return "How firm they are is not known for these constants: `python -m thesis firmness`."
-    hits = f"{totals['expected']:.1f} hits of {len(known.neighbours)}"
-    said = [f"Of a neighbour {hits} are to be expected, by {known.count} of them."]
+        return f"{bare} How firm they are is not known for these constants: `python -m thesis firmness`."
+    mean, low, high = known.expected
+    said = [
+        f"Firm hits: {len(known.firm)} of {len(known.neighbours)}. A neighbour hits {mean:.1f} on average "
+        f"({low:.1f} to {high:.1f} with 95 %, from {len(known.hits)} neighbours). {bare}"
+    ]
     left_out = totals["left_out"]
     if left_out["total"]:
         said.append(f"Left out of the fit by figure: {left_out['hit']} of {left_out['total']}.")

@@ -40,8 +40,9 @@ class Scorecard:
     def totals(self) -> dict[str, dict[str, Any]]:
         """Return {machine: {"all": {hit, near, miss, contradictory, total}, "groups": {group: the same}, ...}}.
 
-        Further "left_out": {hit, total} of statements whose figure a search did not see, "expected": hits to expect of
-        a neighbour, among the statements that were asked of it, or None, and "exclusive": pairs of statements that
+        Further "left_out": {hit, total} of statements whose figure a search did not see; "firm": {hit, total} of the
+        statements that were asked of neighbours and that at least half of them hit, "expected": {mean, low, high} of
+        the hits of a neighbour among these, both None if none was asked; and "exclusive": pairs of statements that
         exclude each other. What is not computed counts in the total alone, so it is no hit.
         """
         found: dict[str, dict[str, Counter[str]]] = {}
@@ -62,7 +63,8 @@ class Scorecard:
             "all": counts.pop("all"),
             "groups": counts,
             "left_out": {"hit": hits, "total": total},
-            "expected": round(sum(known.neighbours.values()), 2) if known else None,
+            "firm": {"hit": len(known.firm), "total": len(known.neighbours)} if known else None,
+            "expected": dict(zip(("mean", "low", "high"), known.expected, strict=True)) if known else None,
             "exclusive": [list(pair) for pair in known.exclusive] if known else [],
         }
 

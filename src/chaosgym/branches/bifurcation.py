@@ -39,6 +39,8 @@ from chaosgym.branches.chord import (
 )
 from chaosgym.branches.orbit_family import CLOSELY, NotFollowedError, OrbitFamily
 from chaosgym.branches.orbit_point import OrbitPoint
+from chaosgym.core import matrices
+from chaosgym.plain import Result
 
 Kind = Literal["grazing", "fold", "flip", "Neimark-Sacker", "symmetry breaking", "branch point"]
 
@@ -54,12 +56,15 @@ ROUNDING = 1e-11
 ROOT_ERROR = 1e-9
 """Error of a root, as a share of the field or of the range."""
 
+MOST_CHANGES = 100
+"""Changes of contacts between two neighbouring orbits: more are the error of contacts that only touch, or chatter."""
+
 SAME_ORBIT = 1e-3
 """Distance, relative to the size of the motion, below which an orbit closes after half its period too."""
 
 
 @dataclass(frozen=True, kw_only=True)
-class Bifurcation:
+class Bifurcation(Result):
     """Where the motion of a branch changes in kind.
 
     Attributes
@@ -86,6 +91,8 @@ class Bifurcation:
         True if the branch ends here: beyond, its orbits are those before once more.
     """
 
+    shows = "kind value error period largest_multiplier impacts largest_peak_N=largest_peak loses_stability ends state"
+
     kind: Kind
     value: float
     error: float
@@ -97,20 +104,10 @@ class Bifurcation:
     loses_stability: bool
     ends: bool = False
 
-    def as_dict(self) -> dict[str, Any]:
-        """Return plain values for JSON."""
-        return {
-            "kind": self.kind,
-            "value": self.value,
-            "error": self.error,
-            "period": self.period,
-            "largest_multiplier": float(np.abs(self.multipliers[0])),
-            "impacts": [list(side) for side in self.impacts],
-            "largest_peak_N": self.largest_peak,
-            "loses_stability": self.loses_stability,
-            "ends": self.ends,
-            "state": self.state.tolist(),
-        }
+    @property
+    def largest_multiplier(self) -> float:
+        """Modulus of the first multiplier."""
+        return float(np.abs(self.multipliers[0]))
 
 
 class Found(NamedTuple):
@@ -128,17 +125,19 @@ def bifurcations_between(family: OrbitFamily, a: OrbitPoint, b: OrbitPoint, *, c
     Raises
     ------
     NotFollowedError
-        If an orbit between them can't be found.
+        If an orbit between them can't be found, or contacts change too often.
     """
-    if a.impacts == b.impacts:
-        yield from _smooth(family, a, b)
-        return
-    before, after = change_of_contacts(family, a, b, PLACED if closely else SOMEWHERE)
-    if not closely and (before.unstable, after.unstable) != (0, 0):
-        before, after = change_of_contacts(family, before, after, PLACED)
-    yield from _smooth(family, a, before)
-    yield grazing(family, before, after)
-    yield from bifurcations_between(family, after, b, closely=closely)
+    for _ in range(MOST_CHANGES):
+        if a.impacts == b.impacts:
+            yield from _smooth(family, a, b)
+            return
+        before, after = change_of_contacts(family, a, b, PLACED if closely else SOMEWHERE)
+        if not closely and (before.unstable, after.unstable) != (0, 0):
+            before, after = change_of_contacts(family, before, after, PLACED)
+        yield from _smooth(family, a, before)
+        yield grazing(family, before, after)
+        a = after
+    raise NotFollowedError(f"contacts change more than {MOST_CHANGES} times from one orbit to the next")
 
 
 def grazing(family: OrbitFamily, before: OrbitPoint, after: OrbitPoint) -> Found:
@@ -149,11 +148,11 @@ def grazing(family: OrbitFamily, before: OrbitPoint, after: OrbitPoint) -> Found
 
 
 def _one(point: OrbitPoint) -> float:
-    return float(np.linalg.det(point.matrix - np.eye(len(point.matrix))))
+    return float(matrices.det(point.matrix - np.eye(len(point.matrix))))
 
 
 def _minus_one(point: OrbitPoint) -> float:
-    return float(np.linalg.det(point.matrix + np.eye(len(point.matrix))))
+    return float(matrices.det(point.matrix + np.eye(len(point.matrix))))
 
 
 def _circle(point: OrbitPoint) -> float:
@@ -177,7 +176,7 @@ def _smooth(family: OrbitFamily, a: OrbitPoint, b: OrbitPoint) -> Iterator[Found
             yield end
             return
     explained = abs(b.unstable - a.unstable) in {abs(change) for change in _changes(signs)}
-    short = float(np.linalg.norm(b.x - a.x)) < NEAREST
+    short = float(matrices.norm(b.x - a.x)) < NEAREST
     if short or (explained and turns <= signs["one"] and (turns or not _turns_twice(a, b))):
         found = []
         for name in (name for name, changes in signs.items() if changes):
@@ -191,6 +190,8 @@ def _smooth(family: OrbitFamily, a: OrbitPoint, b: OrbitPoint) -> Iterator[Found
         yield from _told_apart(family, a, b, sorted(found, key=lambda pair: pair[0]))
         return
     middle = between(family, a, b, 0.5)
+    if max(matrices.norm(middle.x - a.x), matrices.norm(b.x - middle.x)) >= matrices.norm(b.x - a.x):
+        raise NotFollowedError("an orbit between two others lies far aside")
     for one, other in ((a, middle), (middle, b)):
         yield from bifurcations_between(family, one, other)
 
@@ -213,7 +214,7 @@ def _told_apart(family: OrbitFamily, a: OrbitPoint, b: OrbitPoint, found: list[t
 def _turns_twice(a: OrbitPoint, b: OrbitPoint) -> bool:
     """True if the cubic through two orbits turns back in the field and forth again: two folds, which no sign tells."""
     chord = b.x - a.x
-    length = float(np.linalg.norm(chord))
+    length = float(matrices.norm(chord))
     first, last = (length * float(along(one.tangent, chord)[-1]) for one in (a, b))
     # ds/dshare = first + linear share + square share^2
     linear, square = 6.0 * chord[-1] - 4.0 * first - 2.0 * last, 3.0 * (first + last) - 6.0 * chord[-1]
@@ -225,6 +226,8 @@ def _end_on_another(family: OrbitFamily, a: OrbitPoint, b: OrbitPoint) -> Found 
     """Where a branch turns without a multiplier that passes 1: it began at another branch there, and comes back."""
     from scipy.optimize import minimize_scalar
 
+    if family.period % 2 and family.machine.moving.costly and not family.machine.mirrors:
+        return None  # neither a double nor one of two that mirror each other; each look would cost many runs
     side = np.sign(a.tangent[-1])
 
     @cache
@@ -287,11 +290,11 @@ def _root(family: OrbitFamily, a: OrbitPoint, b: OrbitPoint, name: str, turns: b
             known[share] = closely_between(family, a, b, share, known)
         return known[share]
 
-    fine = max(1e-13, ROUNDING / float(np.linalg.norm(b.x - a.x)))
+    fine = max(1e-13, ROUNDING / float(matrices.norm(b.x - a.x)))
     try:
         share = brentq(lambda one: test(orbit(one)), 0.0, 1.0, xtol=fine, rtol=1e-14, full_output=True, disp=False)[0]
     except NotFollowedError:
-        if float(np.linalg.norm(b.x - a.x)) > ROUGHLY_PLACED:
+        if float(matrices.norm(b.x - a.x)) > ROUGHLY_PLACED:
             raise
         share = abs(test(a)) / (abs(test(a)) + abs(test(b)))
         return share, float(a.x[-1] + share * (b.x[-1] - a.x[-1])), a if share < 0.5 else b
@@ -334,9 +337,9 @@ def _closes_earlier(family: OrbitFamily, point: OrbitPoint) -> bool:
     if family.period % 2:
         return False
     half = family.with_period(family.period // 2)
-    return float(np.linalg.norm(half.miss(point.x))) < SAME_ORBIT * float(np.linalg.norm(point.x[:-1]))
+    return float(matrices.norm(half.miss(point.x))) < SAME_ORBIT * float(matrices.norm(point.x[:-1]))
 
 
 def direction_of(point: OrbitPoint, multiplier: float) -> Array:
     """Direction (n,) in which the orbits of a new branch differ: the null vector of M - multiplier I."""
-    return np.asarray(np.linalg.svd(point.matrix - multiplier * np.eye(len(point.matrix)))[2][-1])
+    return np.asarray(matrices.svd(point.matrix - multiplier * np.eye(len(point.matrix))).right[-1])

@@ -17,6 +17,7 @@ from chaosgym.branches.bifurcation import TESTS, Bifurcation, Found, Kind, bifur
 from chaosgym.branches.family_along import continuous_field, family_of, with_noise
 from chaosgym.branches.orbit_family import NotFollowedError, OrbitFamily
 from chaosgym.branches.orbit_point import OrbitPoint
+from chaosgym.core import matrices
 from chaosgym.errors import ParameterError
 from chaosgym.machines import Machine
 from chaosgym.machines.parameters import with_settings
@@ -199,7 +200,7 @@ def _bends(last: Bifurcation, expected: tuple[float, Array], found: Bifurcation)
     """True if a bifurcation lies too far from the value and the state at which the last two lead to expect it."""
 
     def way(value: float, state: Array) -> float:
-        aside = np.linalg.norm(found.state - state) / max(float(np.linalg.norm(found.state)), 1e-300)
+        aside = matrices.norm(found.state - state) / max(float(matrices.norm(found.state)), 1e-300)
         return float(np.hypot((found.value - value) / (WINDOW * found.value), aside))
 
     return way(*expected) > MOST_BEND * way(last.value, last.state) + RESOLVED

@@ -1,6 +1,6 @@
 """Branches of periodic orbits of a machine along one field, with their bifurcations and the sweep that seeded them."""
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, field
 from typing import Any, NamedTuple
 
@@ -13,10 +13,14 @@ from chaosgym.branches.orbit_family import OrbitFamily
 from chaosgym.branches.orbit_point import OrbitPoint
 from chaosgym.machines import Machine
 from chaosgym.machines.parameters import parameters_of
+from chaosgym.plain import Result, plain
+
+SAME_VALUE = 1e-9
+"""Relative difference of two values of a field that are one."""
 
 
 @dataclass(frozen=True, kw_only=True)
-class Branch:
+class Branch(Result):
     """A branch of periodic orbits, in the order in which it is passed.
 
     Attributes
@@ -42,6 +46,8 @@ class Branch:
     at
         For each bifurcation, the number of the orbit before it.
     """
+
+    shows = "period begins ends values largest_multiplier stable peaks_N=peaks impacts"
 
     period: int
     begins: str
@@ -70,41 +76,74 @@ class Branch:
         """Where the orbits attract, (n,)."""
         return np.asarray(self.largest_multiplier < 1.0)
 
+    @property
+    def stretches(self) -> tuple["StableRun", ...]:
+        """Each run of stable orbits, up to the bifurcations at its ends, in the order in which the branch is passed."""
+        edges = np.flatnonzero(np.diff([False, *self.stable.tolist(), False])).reshape(-1, 2)
+        runs = [self._stretch(int(first), int(after) - 1) for first, after in edges]
+        if len(runs) > 1 and self.stable[0] and self.stable[-1] and any(end.startswith("closed") for end in self.ends):
+            last = runs.pop()  # goes on where the branch began
+            runs[0] = StableRun(*(np.concatenate(parts) for parts in zip(last, runs[0], strict=True)))
+        return tuple(runs)
+
+    def _stretch(self, first: int, last: int) -> "StableRun":
+        ends = [(place, one) for one, place in zip(self.bifurcations, self.at, strict=True) if one.loses_stability]
+        before = [one for place, one in ends if place == first - 1][-1:]
+        behind = [one for place, one in ends if place == last][:1]
+        values = [*(one.value for one in before), *self.values[first : last + 1], *(one.value for one in behind)]
+        peaks = self.peaks[first : last + 1].max(axis=1)
+        heights = [*(one.largest_peak for one in before), *peaks, *(one.largest_peak for one in behind)]
+        return StableRun(np.array(values), np.array(heights))
+
     def as_dict(self) -> dict[str, Any]:
         """Return plain values for JSON."""
-        return {
-            "period": self.period,
-            "begins": self.begins,
-            "ends": list(self.ends),
-            "values": self.values.tolist(),
-            "largest_multiplier": self.largest_multiplier.tolist(),
-            "stable": self.stable.tolist(),
-            "peaks_N": self.peaks.tolist(),
-            "impacts": self.impacts.tolist(),
-            "bifurcations": [
-                {**one.as_dict(), "after_orbit": place} for one, place in zip(self.bifurcations, self.at, strict=True)
-            ],
-        }
+        after = zip(self.bifurcations, self.at, strict=True)
+        return {**super().as_dict(), "bifurcations": [{**one.as_dict(), "after_orbit": place} for one, place in after]}
+
+
+class StableRun(NamedTuple):
+    """Values of the field along a run of stable orbits, and the largest peak force of each [N], both (n,)."""
+
+    values: Array
+    peaks: Array
+
+    def peaks_at(self, value: float) -> list[float]:
+        """Largest peak forces of its orbits at a value of the field; more than one where it turns without a loss."""
+        offset = self.values - value
+        offset[np.abs(offset) <= SAME_VALUE * abs(value)] = 0.0
+        crossed = np.flatnonzero(offset[:-1] * offset[1:] < 0.0)
+        shares = offset[crossed] / (offset[crossed] - offset[crossed + 1])
+        between = (1.0 - shares) * self.peaks[crossed] + shares * self.peaks[crossed + 1]
+        return [*self.peaks[offset == 0.0].tolist(), *between.tolist()]
 
 
 class SweptMotion(NamedTuple):
     """A motion that a machine has at one value.
 
-    ``branch`` is the number of the branch through it, from 1 on, or None; ``largest_peak`` in newton; ``share`` that of
-    the random starts that settle on it.
+    ``branch`` is the number of the branch through it, from 1 on, or None; ``stretch`` that of the run of stable orbits
+    of this branch, from 1 on; ``largest_peak`` in newton; ``share`` that of the random starts that settle on it, 0 of
+    one that only its branch tells of.
     """
 
     branch: int | None
+    stretch: int | None
     nature: str
     period: int | None
     largest_peak: float
     share: float
 
+    @property
+    def place(self) -> tuple[int | None, int | None]:
+        """Branch and stretch: the same of motions that follow from each other along the field."""
+        return self.branch, self.stretch
+
 
 class SweepPoint(NamedTuple):
     """What a machine does at one value from rest: its nature, its period if it has one, and its peak forces [N].
 
-    ``motions`` are all that a search met, that from rest first; empty without one.
+    ``motions`` are all that a search met, that from rest first, then other stable orbits of the branches; empty
+    without a search. ``starts`` are its random starts, of which motions that it did not meet take ``unseen`` at most
+    (95 %).
     """
 
     value: float
@@ -113,10 +152,17 @@ class SweepPoint(NamedTuple):
     peaks: Array
     state: Array
     motions: tuple[SweptMotion, ...] = ()
+    starts: int = 0
+    unseen: float = 1.0
+
+    def as_dict(self) -> dict[str, Any]:
+        """Return plain values for JSON."""
+        own = {name: value for name, value in self._asdict().items() if name not in ("peaks", "state")}
+        return {**plain(own), "peaks_N": self.peaks.tolist()}
 
 
 @dataclass(frozen=True, kw_only=True)
-class BifurcationDiagram:
+class BifurcationDiagram(Result):
     """Branches of periodic orbits of a machine along one field, and the sweep that seeded them.
 
     Attributes
@@ -128,6 +174,8 @@ class BifurcationDiagram:
     sweep
         Points of the sweep, by value.
     """
+
+    shows = "machine=machine.name field unit low high branches sweep not_followed"
 
     machine: Machine
     field: str
@@ -141,32 +189,20 @@ class BifurcationDiagram:
         """Those of all branches, by value."""
         return tuple(sorted((each for one in self.branches for each in one.bifurcations), key=lambda b: b.value))
 
+    def places(self, points: Sequence[SweepPoint]) -> list[tuple[int | None, int | None]]:
+        """Branches and stretches on which motions of some points lie, in order; those on no branch last."""
+        there = {one.place for point in points for one in point.motions}
+        return sorted(there, key=lambda place: [(part is None, part or 0) for part in place])
+
     @property
     def not_followed(self) -> tuple[str, ...]:
         """One line for each end of a branch that is neither an end of the range nor a bifurcation."""
         return tuple(end for branch in self.branches for end in branch.ends if "not followed" in end)
 
-    def as_dict(self) -> dict[str, Any]:
-        """Return plain values for JSON."""
-        return {
-            "machine": self.machine.name,
-            "field": self.field,
-            "unit": parameters_of(self.machine)[self.field].unit,
-            "low": self.low,
-            "high": self.high,
-            "branches": [branch.as_dict() for branch in self.branches],
-            "sweep": [
-                {
-                    "value": p.value,
-                    "nature": p.nature,
-                    "period": p.period,
-                    "peaks_N": p.peaks.tolist(),
-                    "motions": [motion._asdict() for motion in p.motions],
-                }
-                for p in self.sweep
-            ],
-            "not_followed": list(self.not_followed),
-        }
+    @property
+    def unit(self) -> str:
+        """Unit of the field."""
+        return parameters_of(self.machine)[self.field].unit
 
     def rows(self) -> Iterator[dict[str, Any]]:
         """One row for each orbit, and for each bifurcation where it lies, for a table."""

@@ -23,7 +23,8 @@ from chaosgym.diagnosis.diagnose import diagnose
 from chaosgym.errors import ParameterError
 from chaosgym.machines import Machine
 from chaosgym.machines.parameters import parameters_of, with_settings
-from chaosgym.simulation import parallel_map
+from chaosgym.plain import Result
+from chaosgym.simulation.parallel import parallel_map
 
 COLUMNS, ROWS = 25, 13
 """Points of the sweep along the first and along the second field."""
@@ -33,7 +34,7 @@ SAME = 1e-6
 
 
 @dataclass(frozen=True, kw_only=True)
-class BifurcationMap:
+class BifurcationMap(Result):
     """Natures of a sweep over two fields, and curves of bifurcations.
 
     Attributes
@@ -54,6 +55,8 @@ class BifurcationMap:
         Of the bifurcations at which stability ends.
     """
 
+    shows = "machine=machine.name along against along_values against_values nature period curves"
+
     machine: Machine
     along: str
     against: str
@@ -66,19 +69,9 @@ class BifurcationMap:
 
     def as_dict(self) -> dict[str, Any]:
         """Return plain values for JSON."""
-        known = parameters_of(self.machine)
-        return {
-            "machine": self.machine.name,
-            "along": self.along,
-            "along_unit": known[self.along].unit,
-            "against": self.against,
-            "against_unit": known[self.against].unit,
-            "along_values": self.along_values.tolist(),
-            "against_values": self.against_values.tolist(),
-            "nature": self.nature.tolist(),
-            "period": self.period.tolist(),
-            "curves": [curve.as_dict() for curve in self.curves],
-        }
+        about = parameters_of(self.machine)
+        units = {"along_unit": about[self.along].unit, "against_unit": about[self.against].unit}
+        return {**super().as_dict(), **units}
 
     def rows(self) -> Iterator[dict[str, Any]]:
         """One row for each point of a curve, for a table."""

@@ -22,6 +22,8 @@ from chaosgym.branches.chord import between, interpolated
 from chaosgym.branches.orbit_family import NotFollowedError, OrbitFamily
 from chaosgym.branches.orbit_point import OrbitPoint
 from chaosgym.branches.section import better_section
+from chaosgym.core import matrices
+from chaosgym.core.matrices import product
 
 LEAST_STEP = 1e-7
 """Shortest step, in scaled unknowns."""
@@ -38,6 +40,9 @@ LEAST_COSINE = 0.8
 BESIDE, LONG = 0.08, 1e-2
 """Sine by which the chord of a step may lie beside the mean of the tangents at its ends, and the step above which that
 counts: near grazing tangents are not good enough for shorter ones."""
+
+SHORT = 1e-3
+"""Step below which Newton's method is tried where Broyden's fails: a shorter step is cheaper than its derivatives."""
 
 NEAR, FAR = 0.05, 0.3
 """Share of a step by which the orbit should, and by which it may lie away from where it is expected."""
@@ -92,6 +97,7 @@ def stretch(
     until: Callable[[Bifurcation], bool] | None = None,
     most_unstable: float = MOST_UNSTABLE,
     closely: bool = True,
+    most_points: int = MOST_POINTS,
 ) -> Stretch:
     """Follow a branch along the tangent of ``start`` until the range or the branch ends.
 
@@ -107,6 +113,8 @@ def stretch(
         Largest modulus of a multiplier up to which the branch is followed.
     closely
         Place every grazing to 1e-9, not only those that stability depends on.
+    most_points
+        Orbits at the most.
     """
     family, start = family.with_mirror(start)
     points: list[OrbitPoint] = [start]
@@ -114,7 +122,7 @@ def stretch(
     at: list[int] = []
     straight = Bend(np.zeros_like(start.x), np.zeros_like(start.slope))
     here, begun, step, bend = start, Begun(start.x, start.tangent), first_step, straight
-    while len(points) < MOST_POINTS:
+    while len(points) < most_points:
         if len(points) % LOOKED_AT == 1:
             if _repeats(points):
                 reason = "a step left the branch, which comes back to an orbit passed before"
@@ -123,7 +131,7 @@ def stretch(
             if moved is not family:
                 family, bend = moved, straight
                 begun = Begun(*family.carried(start, family.phase))
-        cap = longest_step * max(1.0, float(np.linalg.norm(here.x[:-1])))
+        cap = longest_step * max(1.0, float(matrices.norm(here.x[:-1])))
         step = min(step, cap, longest_step / max(abs(here.tangent[-1]), 1e-12))
         try:
             there, step = _next(family, here, step, bend)
@@ -160,10 +168,10 @@ def stretch(
             return Stretch(points, found, at, "closed: the branch comes back to where it began")
         if there.largest_multiplier > most_unstable:
             return Stretch(points, found, at, f"multiplier {there.largest_multiplier:.3g} at {_place(family, there)}")
-        length = max(float(np.linalg.norm(there.x - here.x)), LEAST_STEP)
+        length = max(float(matrices.norm(there.x - here.x)), LEAST_STEP)
         bend = Bend((there.tangent - here.tangent) / length, (there.slope - here.slope) / length)
         here = there
-    return Stretch(points, found, at, f"{MOST_POINTS} orbits: not followed beyond {_place(family, here)}")
+    return Stretch(points, found, at, f"{most_points} orbits: not followed beyond {_place(family, here)}")
 
 
 def _place(family: OrbitFamily, point: OrbitPoint) -> str:
@@ -187,8 +195,17 @@ def _next(family: OrbitFamily, here: OrbitPoint, step: float, bend: "Bend") -> t
             ahead[-1] = border - here.x[-1]
             normal = np.zeros_like(here.tangent)
             normal[-1] = np.sign(here.tangent[-1])
+        sharp = False
         try:
-            there = family.solve(here.x + ahead, normal, here.slope + step * bend.slope)
+            slope = here.slope + step * bend.slope
+            there = family.solve(
+                here.x + ahead, normal, slope, near=(here.solved,), measured=False, patient=step < SHORT
+            )
+            off = max(float(matrices.norm(there.x - here.x - ahead)) - max(ROUNDING, 10.0 * family.noise), 0.0)
+            if step > 3.0 * LEAST_STEP:
+                sharp = off > FAR * length
+            if not sharp:
+                there = family.measured(there)
         except NotFollowedError as failed:
             reason = str(failed)
             step = 0.3 * min(step, length)
@@ -197,10 +214,9 @@ def _next(family: OrbitFamily, here: OrbitPoint, step: float, bend: "Bend") -> t
             reason = "another branch crosses"
             step = 0.3 * min(step, length)
             continue
-        off = max(float(np.linalg.norm(there.x - here.x - ahead)) - max(ROUNDING, 10.0 * family.noise), 0.0)
-        turned = float(there.tangent @ here.tangent)
+        turned = float(product(there.tangent, here.tangent))
         beside = _beside(here, there) if length > LONG else 0.0
-        if step > 3.0 * LEAST_STEP and (off > FAR * length or turned < LEAST_COSINE or beside > BESIDE):
+        if step > 3.0 * LEAST_STEP and (sharp or turned < LEAST_COSINE or beside > BESIDE):
             reason = "the branch turns too sharply"
             step = 0.4 * min(step, length)
             continue
@@ -218,8 +234,8 @@ def _crossing(here: OrbitPoint, there: OrbitPoint) -> bool:
 def _beside(here: OrbitPoint, there: OrbitPoint) -> float:
     """How far the chord of two orbits lies beside the mean of their tangents: much if another branch was met."""
     chord = there.x - here.x
-    unit = chord / max(float(np.linalg.norm(chord)), 1e-300)
-    return float(np.linalg.norm(unit - 0.5 * (here.tangent + there.tangent)))
+    unit = chord / max(float(matrices.norm(chord)), 1e-300)
+    return float(matrices.norm(unit - 0.5 * (here.tangent + there.tangent)))
 
 
 def _beyond_grazing(family: OrbitFamily, here: OrbitPoint) -> OrbitPoint | None:
@@ -237,7 +253,7 @@ def _beyond_grazing(family: OrbitFamily, here: OrbitPoint) -> OrbitPoint | None:
                 there = family.solve(here.x + sign * distance * tangent, sign * tangent)
             except NotFollowedError:
                 continue
-            near = float(np.linalg.norm(there.x - here.x)) < 10.0 * distance
+            near = float(matrices.norm(there.x - here.x)) < 10.0 * distance
             if near and there.impacts != here.impacts and not _crossing(here, there):
                 return there
     return None
@@ -249,14 +265,14 @@ def _at_end(family: OrbitFamily, here: OrbitPoint, beyond: OrbitPoint) -> OrbitP
 
     border = 1.0 if beyond.x[-1] > 1.0 else 0.0
     share = float(brentq(lambda one: _s_between(family, here, beyond, one) - border, 0.0, 1.0, xtol=1e-12, disp=False))
-    last = between(family, here, beyond, share)
+    last = between(family, here, beyond, share, measured=False)
     normal = np.zeros_like(last.tangent)
     normal[-1] = np.sign(last.tangent[-1])
-    return family.solve(np.append(last.x[:-1], border), normal)
+    return family.solve(np.append(last.x[:-1], border), normal, last.slope, near=(last.solved,))
 
 
 def _s_between(family: OrbitFamily, here: OrbitPoint, beyond: OrbitPoint, share: float) -> float:
-    point = beyond if share == 1.0 else here if share == 0.0 else between(family, here, beyond, share)
+    point = beyond if share == 1.0 else here if share == 0.0 else between(family, here, beyond, share, measured=False)
     return float(point.x[-1])
 
 
@@ -266,15 +282,15 @@ def _repeats(points: list[OrbitPoint]) -> bool:
         return False
     *before, here, there = points
     chord = there.x - here.x
-    length = float(np.linalg.norm(chord))
+    length = float(matrices.norm(chord))
     low, high = sorted((here.x[-1], there.x[-1]))
     for one in before[:-1]:
         if one.phase != there.phase or not low - PASSED * length <= one.x[-1] <= high + PASSED * length:
             continue
-        share = float((one.x - here.x) @ chord) / length**2
-        if not 0.0 <= share <= 1.0 + PASSED or float(one.tangent @ there.tangent) < 0.5:
+        share = float(product(one.x - here.x, chord)) / length**2
+        if not 0.0 <= share <= 1.0 + PASSED or float(product(one.tangent, there.tangent)) < 0.5:
             continue
-        if float(np.linalg.norm(interpolated(here, there, share) - one.x)) < PASSED * length:
+        if float(matrices.norm(interpolated(here, there, share) - one.x)) < PASSED * length:
             return True
     return False
 
@@ -282,8 +298,8 @@ def _repeats(points: list[OrbitPoint]) -> bool:
 def _returns(start: Begun, here: OrbitPoint, there: OrbitPoint) -> bool:
     """True if a step passes by where the branch began, the same way."""
     chord = there.x - here.x
-    length = float(np.linalg.norm(chord))
-    share = float((start.x - here.x) @ chord) / length**2
-    if not 0.0 <= share <= 1.0 or float(start.tangent @ there.tangent) < 0.5:
+    length = float(matrices.norm(chord))
+    share = float(product(start.x - here.x, chord)) / length**2
+    if not 0.0 <= share <= 1.0 or float(product(start.tangent, there.tangent)) < 0.5:
         return False
-    return float(np.linalg.norm(here.x + share * chord - start.x)) < 0.2 * length
+    return float(matrices.norm(here.x + share * chord - start.x)) < 0.2 * length

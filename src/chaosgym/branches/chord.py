@@ -1,12 +1,15 @@
 """Orbits of a branch between two neighbours, and where the contacts change between them."""
 
 from collections.abc import Mapping
+from dataclasses import replace
 
 import numpy as np
 
 from chaosgym.arrays import Array
 from chaosgym.branches.orbit_family import CLOSED, CLOSELY, NotFollowedError, OrbitFamily
 from chaosgym.branches.orbit_point import OrbitPoint
+from chaosgym.core import matrices
+from chaosgym.core.matrices import product
 
 NOISY = 100.0
 """What the noise of a family adds to the error of a place on a branch, in units of that noise."""
@@ -28,12 +31,33 @@ FIRST_DOUBT, LEAST_DOUBT, MOST_ROUNDS = 1e-3, 1e-4, 40
 guessing at the most."""
 
 
-def between(family: OrbitFamily, a: OrbitPoint, b: OrbitPoint, share: float, closed: float = CLOSED) -> OrbitPoint:
-    """The orbit of a branch between two of its orbits, at a share of the chord."""
+LEAST_GAIN = 0.5
+"""Ratio of the lengths of two brackets above which the next one is not worth its orbits."""
+
+
+def between(
+    family: OrbitFamily,
+    a: OrbitPoint,
+    b: OrbitPoint,
+    share: float,
+    closed: float = CLOSED,
+    *,
+    measured: bool = True,
+) -> OrbitPoint:
+    """The orbit of a branch between two of its orbits, at a share of the chord; ``measured`` as for ``solve``."""
     chord = b.x - a.x
     slope = (1.0 - share) * a.slope + share * b.slope
-    unit = chord / np.linalg.norm(chord)
-    return family.solve(interpolated(a, b, share), unit, slope, closed=closed, exact=False)
+    unit = chord / matrices.norm(chord)
+    guess, near = interpolated(a, b, share), _near(a, b, share)
+    alone = len(near) == 1  # on both sides of a change of contacts Newton's method fails too
+    return family.solve(guess, unit, slope, near=near, closed=closed, exact=False, measured=measured, patient=alone)
+
+
+def _near(a: OrbitPoint, b: OrbitPoint, share: float) -> tuple[Array, ...]:
+    """Derivatives of the map between two orbits: it jumps where a contact more or less pushes at once."""
+    if a.impacts == b.impacts:
+        return ((1.0 - share) * a.solved + share * b.solved,)
+    return (a.solved, b.solved) if share < 0.5 else (b.solved, a.solved)
 
 
 def closely_between(
@@ -47,14 +71,14 @@ def closely_between(
         If Newton's method finds none, or the orbit of half the period that the branch began at.
     """
     chord = b.x - a.x
-    unit = chord / np.linalg.norm(chord)
+    unit = chord / matrices.norm(chord)
     low, high = max(one for one in known if one < share), min(one for one in known if one > share)
     before, after = known[low], known[high]
     part = (share - low) / (high - low)
     guess = interpolated(before, after, part)
-    guess += (share * np.linalg.norm(chord) - unit @ (guess - a.x)) * unit
+    guess += (share * matrices.norm(chord) - product(unit, guess - a.x)) * unit
     slope = (1.0 - part) * before.slope + part * after.slope
-    point = family.solve(guess, unit, slope, closed=CLOSELY, exact=False)
+    point = family.solve(guess, unit, slope, near=_near(before, after, part), closed=CLOSELY, exact=False)
     if point.halved and not (a.halved or b.halved):
         raise NotFollowedError("Newton's method leads to the orbit of half the period")
     return point
@@ -65,13 +89,13 @@ def interpolated(a: OrbitPoint, b: OrbitPoint, share: float) -> Array:
     chord = b.x - a.x
     rise, run = share * share * (3.0 - 2.0 * share), share * (1.0 - share)
     bend = run * ((1.0 - share) * along(a.tangent, chord) - share * along(b.tangent, chord))
-    return np.asarray(a.x + rise * chord + bend * np.linalg.norm(chord))
+    return np.asarray(a.x + rise * chord + bend * matrices.norm(chord))
 
 
 def along(tangent: Array, chord: Array) -> Array:
     """A tangent scaled to grow by one chord along the chord; the chord's direction where they are nearly normal."""
-    unit = chord / np.linalg.norm(chord)
-    part = float(tangent @ unit)
+    unit = chord / matrices.norm(chord)
+    part = float(product(tangent, unit))
     return tangent / part if part > 0.1 else unit
 
 
@@ -83,9 +107,9 @@ def change_of_contacts(
     States on the cubic between both are run for a cheap guess of where it is. Then an orbit is found on either side of
     the guess, as far from it as it may err; one that lies on the wrong side brackets the change too.
     """
-    doubt = FIRST_DOUBT
+    doubt, first, last = FIRST_DOUBT, a.x, b.x
     for _ in range(MOST_ROUNDS):
-        length = float(np.linalg.norm(b.x - a.x))
+        length = float(matrices.norm(b.x - a.x))
         placed = max(within, NOISY * family.noise)
         apart = abs(float(b.x[-1] - a.x[-1]))
         if length < placed or (length < NEAR_ENOUGH and apart < placed):
@@ -93,8 +117,10 @@ def change_of_contacts(
         doubt = min(max(doubt, 0.4 * placed / length), 0.25)
         guess = float(np.clip(_guess(family, a, b, doubt), 1.01 * doubt, 1.0 - 1.01 * doubt))
         try:
-            below = between(family, a, b, guess - doubt, CLOSELY)
-            above = between(family, a, b, guess + doubt, CLOSELY) if below.impacts == a.impacts else below
+            below = between(family, a, b, guess - doubt, CLOSELY, measured=False)
+            above = below
+            if below.impacts == a.impacts:
+                above = between(family, a, b, guess + doubt, CLOSELY, measured=False)
         except NotFollowedError:
             if length > ROUGHLY_PLACED:
                 raise
@@ -105,7 +131,15 @@ def change_of_contacts(
             a, doubt = above, 8.0 * doubt
         else:
             a, b, doubt = below, above, max(0.1 * doubt, LEAST_DOUBT)
-    return a, b
+            if float(matrices.norm(b.x - a.x)) > LEAST_GAIN * length:
+                break  # the map itself jumps there, by the error of its events
+    before, after = family.measured(a, exact=False), family.measured(b, exact=False)
+    return _facing(before, before.x - first), _facing(after, last - after.x)
+
+
+def _facing(point: OrbitPoint, way: Array) -> OrbitPoint:
+    """The orbit with its tangent turned along a way: what Broyden's method learned near grazing may point back."""
+    return replace(point, tangent=-point.tangent) if float(product(point.tangent, way)) < 0.0 else point
 
 
 def _guess(family: OrbitFamily, a: OrbitPoint, b: OrbitPoint, resolution: float) -> float:

@@ -59,10 +59,6 @@ class Crisis(NamedTuple):
     second: float
     because: str
 
-    def as_dict(self) -> dict[str, Any]:
-        """Return plain values for JSON."""
-        return self._asdict()
-
 
 def carried(machine: Machine, field: str) -> Carried:
     """Peak forces [N] of a machine, largest of all surfaces, with one field at other values."""

@@ -18,13 +18,16 @@ from chaosgym.branches.branch import MOST_UNSTABLE, Stretch, stretch
 from chaosgym.branches.family_along import continuous_field, family_of, with_noise
 from chaosgym.branches.orbit_family import NotFollowedError, OrbitFamily
 from chaosgym.branches.orbit_point import OrbitPoint
+from chaosgym.core import matrices
+from chaosgym.core.matrices import product
 from chaosgym.diagnosis.attractors import Attractors, attractors
 from chaosgym.diagnosis.diagnose import diagnose
 from chaosgym.diagnosis.periodic_orbit import find_periodic_orbit
 from chaosgym.errors import ParameterError, SimulationError
 from chaosgym.machines import Machine
 from chaosgym.machines.parameters import with_settings
-from chaosgym.simulation import parallel_map
+from chaosgym.numbers import number, whole
+from chaosgym.simulation.parallel import parallel_map
 
 SWEEP = 41
 """Points of the sweep."""
@@ -102,7 +105,8 @@ def follow(
     Raises
     ------
     ParameterError
-        If the field is unknown or does not vary continuously, or the span is empty or leaves the field's range.
+        If the field is unknown or does not vary continuously, the span is empty or leaves the field's range, or a
+        number is out of range.
 
     Examples
     --------
@@ -111,6 +115,8 @@ def follow(
     >>> [(one.kind, one.value) for one in diagram.bifurcations if one.loses_stability]  # doctest: +SKIP
     """
     name, (low, high) = continuous_field(machine, along), span
+    sweep, longest_period = whole("sweep", sweep, 0, 10**6), whole("longest_period", longest_period, 1)
+    number("most_unstable", most_unstable, 1.0)
     if not low < high:
         raise ParameterError(f"{name} = {low:g} to {high:g} is empty or reversed; allowed: the lower value first")
     for value in (low, high):
@@ -136,23 +142,46 @@ def follow(
         low=low,
         high=high,
         branches=tuple(found.branches),
-        sweep=tuple(_with_motions(point, met, through.get(place, [])) for place, (point, met) in enumerate(points)),
+        sweep=tuple(
+            _with_motions(point, met, through.get(place, []), found.branches)
+            for place, (point, met) in enumerate(points)
+        ),
     )
 
 
-def _with_motions(point: SweepPoint, met: Attractors | None, through: list[int | None]) -> SweepPoint:
-    """The point with the motions that were met there, the proven ones of them with the branches ``through`` them."""
+def _with_motions(
+    point: SweepPoint, met: Attractors | None, through: list[int | None], branches: Sequence[Branch]
+) -> SweepPoint:
+    """The point with the motions that were met there, and other stable orbits of the branches.
+
+    The branches ``through`` the proven ones of them are given in the order of their periods.
+    """
     if met is None:
         return point
-    proven = [one for one in met.motions if one.orbit is not None]
-    proven.sort(key=lambda one: one.period or 0)
+    proven = sorted((one for one in met.motions if one.orbit is not None), key=lambda one: one.period or 0)
     number = {id(one): branch for one, branch in zip(proven, through, strict=True)}
-    return point._replace(
-        motions=tuple(
-            SweptMotion(number.get(id(one)), one.nature, one.period, one.largest_peak, met.share(one)[0])
-            for one in met.motions
-        )
-    )
+    there = {
+        (branch, stretch): (one.period, peak)
+        for branch, one in enumerate(branches, 1)
+        for stretch, run in enumerate(one.stretches, 1)
+        for peak in run.peaks_at(point.value)
+    }
+    motions = []
+    for one in met.motions:
+        own = number.get(id(one))
+        stretch = min(
+            (place for place in there if place[0] == own),
+            key=lambda place: abs(there[place][1] - one.largest_peak),
+            default=(own, None),
+        )[1]
+        motions.append(SweptMotion(own, stretch, one.nature, one.period, one.largest_peak, met.share(one)[0]))
+    seen = {(one.branch, one.stretch) for one in motions}
+    motions += [
+        SweptMotion(*place, "periodic", period, peak, 0.0)
+        for place, (period, peak) in there.items()
+        if place not in seen
+    ]
+    return point._replace(motions=tuple(motions), starts=met.starts, unseen=met.unseen)
 
 
 _Swept = tuple[SweepPoint, Attractors | None]
@@ -232,14 +261,14 @@ class _Branches:
             return
         aside = np.append(direction_of(at.point, multiplier), 0.0)
         # the branch that is left must not meet the planes on which the new one is looked for
-        aside -= (aside @ at.point.tangent) * at.point.tangent
-        normal = aside / np.linalg.norm(aside)
+        aside -= product(aside, at.point.tangent) * at.point.tangent
+        normal = aside / matrices.norm(aside)
         for amplitude in AMPLITUDES[kind]:
             try:
                 start = family.solve(at.point.x + amplitude * normal, normal)
             except NotFollowedError:
                 continue
-            apart = np.linalg.norm(parent.miss(start.x)) if family.period > parent.period else np.inf
+            apart = matrices.norm(parent.miss(start.x)) if family.period > parent.period else np.inf
             if apart > 0.1 * amplitude and not start.symmetric:
                 break
         else:

@@ -8,9 +8,10 @@ import numpy as np
 
 from chaosgym.arrays import Array
 from chaosgym.branches.orbit_family import CLOSELY, OrbitFamily
+from chaosgym.core import matrices
 from chaosgym.errors import ParameterError, SimulationError
 from chaosgym.machines import Machine
-from chaosgym.machines.parameters import check_parameter, field_named, parameters_of, suggestion
+from chaosgym.machines.parameters import USUAL, check_parameter, field_named, parameters_of, suggestion
 
 UNMOVED = 1e-13
 """Change of s that changes nothing but the rounding of a model."""
@@ -27,7 +28,7 @@ def family_of(machine: Machine, field: str, low: float, high: float, state: Arra
     for value in (low, high):
         check_parameter(machine, field, value)
     weight = machine.state_weights(state)
-    size = float(np.linalg.norm(weight * state)) or 1.0
+    size = float(matrices.norm(weight * state)) or 1.0
     machines = machine.along(field, low, high)
     return OrbitFamily(machine, field, low, high, period, np.asarray(weight / size), machines)
 
@@ -42,25 +43,22 @@ def with_noise(family: OrbitFamily, state: Array) -> OrbitFamily:
         ends = [family.end(x, s + k * UNMOVED) for k in range(4)]
     except SimulationError:
         return family
-    jumps = [float(np.linalg.norm(b - a)) for a, b in pairwise(ends)]
+    jumps = [float(matrices.norm(b - a)) for a, b in pairwise(ends)]
     return replace(family, noise=max(max(jumps) - CLOSELY, 0.0))
 
 
 def continuous_field(machine: Machine, name: str) -> str:
-    """Field of a machine by its name, or by "speed" or "clearance".
+    """Field of a machine by one of its names, see ``field_named``.
 
     Raises
     ------
     ParameterError
         If there is none, or none that varies continuously.
     """
-    usual = {"speed": machine.speed_field, "clearance": machine.clearance_field}
-    known = parameters_of(machine)
-    name = field_named(machine, name)
-    field = name if name in known else usual.get(name, name)
+    known, field = parameters_of(machine), field_named(machine, name)
     numbers: list[str] = [key for key, about in known.items() if not about.choices and _continuous(machine, key)]
     if field not in numbers:
-        hint = suggestion(name, [*usual, *numbers])
+        hint = suggestion(name, [*USUAL, *numbers])
         raise ParameterError(f"{type(machine).__name__} has no field {name!r} that varies continuously{hint}")
     return field
 

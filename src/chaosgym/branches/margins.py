@@ -1,12 +1,13 @@
 """Margins of a periodic response: how far each parameter may move until the motion loses its stability, and how.
 
-Each parameter that has a tolerance is varied alone, to either side, up to some tolerances away. Where the orbits at
-both ends are stable, have the same contacts and lie nearly in a line with the nominal one, nothing happens between
+Each parameter that has a tolerance is varied alone, to either side, up to some tolerances away. Where the orbits on
+the way are far from losing their stability, have the same contacts and lie nearly in a line, nothing happens between
 them; elsewhere the branch is followed until stability ends.
 
 A margin follows this motion. What lives beside it, ``coexistence`` tells.
 """
 
+import math
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from typing import Any, NamedTuple
@@ -20,12 +21,15 @@ from chaosgym.branches.family_along import family_of, with_noise
 from chaosgym.branches.orbit_family import NotFollowedError, OrbitFamily, contacts_of
 from chaosgym.branches.orbit_point import OrbitPoint
 from chaosgym.branches.section import better_section
-from chaosgym.diagnosis.periodic_orbit import PeriodicOrbit, find_periodic_orbit, run_period
+from chaosgym.core import matrices
+from chaosgym.diagnosis.periodic_orbit import PeriodicOrbit, run_period
 from chaosgym.diagnosis.response_type import Tolerance, chosen_tolerances
 from chaosgym.diagnosis.verdict import MachineDiagnosis
 from chaosgym.errors import DiagnosisError
 from chaosgym.machines import Machine
 from chaosgym.machines.parameters import parameters_of
+from chaosgym.numbers import number
+from chaosgym.plain import Result
 
 REACH = 1.0
 """Tolerances up to which stability is followed."""
@@ -33,9 +37,9 @@ REACH = 1.0
 CALM = 0.9
 """Largest multiplier of orbits between which nothing is looked for."""
 
-BENT = 0.3
-"""Share of the way from one end to the other by which the nominal orbit may lie beside its middle, so that the ends
-decide."""
+BENT, HALVINGS = 0.3, 4
+"""Share of the way from one orbit to another by which that in the middle may lie beside the line, so that nothing is
+looked for between them; and how often the way is halved until that is so."""
 
 
 class Margin(NamedTuple):
@@ -65,7 +69,7 @@ class Margin(NamedTuple):
 
 
 @dataclass(frozen=True, kw_only=True)
-class Margins:
+class Margins(Result):
     """Margins of a periodic response.
 
     Attributes
@@ -78,6 +82,8 @@ class Margins:
         By field.
     """
 
+    shows = "largest_multiplier margins nearest tolerances"
+
     largest_multiplier: float
     margins: tuple[Margin, ...]
     tolerances: Mapping[str, Tolerance]
@@ -87,15 +93,6 @@ class Margins:
         """The loss of stability that is the fewest tolerances away, or None."""
         ends = [margin for margin in self.margins if margin.kind is not None]
         return min(ends, key=lambda margin: margin.share, default=None)
-
-    def as_dict(self) -> dict[str, Any]:
-        """Return plain values for JSON."""
-        return {
-            "largest_multiplier": self.largest_multiplier,
-            "margins": [margin._asdict() for margin in self.margins],
-            "nearest": self.nearest._asdict() if self.nearest else None,
-            "tolerances": {name: tolerance._asdict() for name, tolerance in self.tolerances.items()},
-        }
 
 
 def margins(
@@ -135,8 +132,7 @@ def margins(
     """
     if not orbit.certified:
         raise DiagnosisError("margins need a periodic orbit that is certified; allowed: one that closes and attracts")
-    if not reach > 0.0:
-        raise DiagnosisError(f"reach = {reach:g} tolerances is out of range; allowed: above 0")
+    number("reach", reach, 0.0, unit="tolerances", inside=True, error=DiagnosisError)
     chosen = chosen_tolerances(machine, tolerances, "parameters")
     contacts = contacts_of(run_period(machine, orbit.state, orbit.period))
     found = tuple(
@@ -154,7 +150,7 @@ def margins(
 def margins_of(
     machine: Machine, verdict: MachineDiagnosis, tolerances: Mapping[str, Tolerance] | None = None, **how: Any
 ) -> Margins | None:
-    """Margins of a machine whose response is diagnosed; None unless it is periodic and proven.
+    """Margins of a machine whose response is diagnosed; None unless an orbit that attracts is proven.
 
     Parameters
     ----------
@@ -173,9 +169,7 @@ def margins_of(
     >>> margins_of(beam, chaosgym.diagnose(beam)).nearest.kind  # doctest: +SKIP
     'fold'
     """
-    if verdict.status != "certified" or verdict.period is None:
-        return None
-    orbit = find_periodic_orbit(machine, verdict.evidence["final_state"], verdict.period)
+    orbit = verdict.orbit
     return margins(machine, orbit, tolerances, **how) if orbit is not None and orbit.certified else None
 
 
@@ -190,44 +184,65 @@ def _along(
     family = family_of(machine, name, low, high, orbit.state, orbit.period)
     here = np.append(family.weight * orbit.state, (nominal - low) / (high - low))
     normal = np.append(np.zeros(len(orbit.state)), 1.0)
-    below = _calm_end(family, here, contacts, normal, 0.0)
-    above = _calm_end(family, here, contacts, normal, 1.0) if below is not None else None
+    ends = {side: _calm(family, np.append(here[:-1], place), contacts) for side, place in ((-1, 0.0), (1, 1.0))}
+    straight = _straight(here, ends[-1], ends[1])
+    quiet = {
+        side: straight or (end is not None and _quiet(family, here, end, contacts, HALVINGS))
+        for side, end in ends.items()
+    }
     start: OrbitPoint | None = None
-    if below is None or above is None or not _straight(here, below, above):
+    if not all(quiet.values()):
         family = with_noise(family, orbit.state)
         try:
             family, start = better_section(*family.with_mirror(family.solve(here, normal)))
         except NotFollowedError as reason:
             told = f"not followed: {reason}"
             return [Margin(name, side, 0.0, nominal, None, told) for side in (-1, 1)]
-    found = []
+    result = []
     for side, value in ((-1, low), (1, high)):
         if value == nominal:
-            found.append(Margin(name, side, 0.0, value, None, "end of the field's range"))
-        elif start is None:
-            found.append(Margin(name, side, _share(tolerance, nominal, value), value, None))
+            result.append(Margin(name, side, 0.0, value, None, "end of the field's range"))
+        elif start is None or quiet[side]:
+            result.append(Margin(name, side, _share(tolerance, nominal, value), value, None))
         else:
-            found.append(_followed(family, start, side, name, tolerance, nominal))
-    return found
+            result.append(_followed(family, start, side, name, tolerance, nominal))
+    return result
 
 
-def _calm_end(
-    family: OrbitFamily, here: Array, contacts: tuple[int, ...], normal: Array, border: float
-) -> OrbitPoint | None:
-    """The orbit at an end of the range if Newton's method leads there and it is far from losing its stability."""
-    guess = np.append(here[:-1], border)
+def _straight(here: Array, below: OrbitPoint | None, above: OrbitPoint | None) -> bool:
+    """Whether the orbits at both ends are calm, and the nominal one lies nearly in a line with them."""
+    if below is None or above is None:
+        return False
+    way = above.x[:-1] - below.x[:-1]
+    beside = here[:-1] - below.x[:-1] - here[-1] * way
+    return float(matrices.norm(beside)) <= BENT * max(float(matrices.norm(way)), 1e-12)
+
+
+def _quiet(family: OrbitFamily, here: Array, end: OrbitPoint, contacts: tuple[int, ...], halvings: int) -> bool:
+    """Whether the orbits between two are calm and, between as many of them as that takes, lie nearly in a line."""
+    guess = 0.5 * (here + end.x)
+    middle = _calm(family, guess, contacts, end.solved)
+    if middle is None:
+        return False
+    way = float(matrices.norm((end.x - here)[:-1]))
+    if float(matrices.norm((middle.x - guess)[:-1])) <= BENT * max(way, 1e-12):
+        return True
+    return halvings > 0 and all(
+        _quiet(family, one, other, contacts, halvings - 1) for one, other in ((here, middle), (middle.x, end))
+    )
+
+
+def _calm(family: OrbitFamily, guess: Array, contacts: tuple[int, ...], near: Array | None = None) -> OrbitPoint | None:
+    """The orbit at the field's value of a guess if Newton's method leads there and it is far from losing stability.
+
+    ``near`` as in ``OrbitFamily.solve``.
+    """
+    normal = np.append(np.zeros(len(guess) - 1), 1.0)
     try:
-        point = family.solve(guess, normal, np.zeros(len(here) - 1), exact=False)
+        point = family.solve(guess, normal, np.zeros(len(guess) - 1), near=() if near is None else (near,), exact=False)
     except NotFollowedError:
         return None
     return point if point.impacts == contacts and point.largest_multiplier < CALM else None
-
-
-def _straight(here: Array, below: OrbitPoint, above: OrbitPoint) -> bool:
-    way = above.x[:-1] - below.x[:-1]
-    share = here[-1]
-    beside = here[:-1] - below.x[:-1] - share * way
-    return float(np.linalg.norm(beside)) <= BENT * max(float(np.linalg.norm(way)), 1e-12)
 
 
 def _followed(
@@ -251,5 +266,5 @@ def _followed(
 def _share(tolerance: Tolerance, nominal: float, value: float) -> float:
     """Distance of a value from the nominal one in tolerances."""
     if tolerance.relative:
-        return float(abs(np.log(value / nominal)) / np.log1p(tolerance.value))
+        return abs(math.log(value / nominal)) / math.log1p(tolerance.value)
     return abs(value - nominal) / tolerance.value

@@ -6,14 +6,18 @@ Unknowns are scaled: z = W y / |W y_0| with the weights of energy, s = (p - low)
 offer is its stroboscopic map with its derivative (``periodic_orbit.period_map``), nothing else.
 """
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
 from dataclasses import dataclass, replace
 
 import numpy as np
 
 from chaosgym.arrays import Array
 from chaosgym.branches.orbit_point import OrbitPoint
+from chaosgym.core import matrices
+from chaosgym.core.matrices import product
 from chaosgym.core.tangent import Tangents
+from chaosgym.diagnosis.broyden import Root, root_near
 from chaosgym.diagnosis.periodic_orbit import Period, period_map, run_period
 from chaosgym.errors import ParameterError, SimulationError
 from chaosgym.machines import Machine
@@ -21,7 +25,8 @@ from chaosgym.machines import Machine
 CLOSED, CLOSELY = 1e-10, 1e-12
 """Miss of an orbit, relative to its size, at which Newton's method stops, and at which it does at a bifurcation."""
 
-MOST_ITERATIONS = 14
+MOST_ITERATIONS, FEW_ITERATIONS = 14, 4
+"""Of Newton's method, and where each costs many runs and Broyden's method came first."""
 
 MOST_HALVINGS, ROUGH = 3, 1e-2
 """Halvings of a step of Newton's method that makes the miss larger, and the miss above which it is not worth them."""
@@ -49,6 +54,17 @@ NOISE = 1e-12
 
 class NotFollowedError(Exception):
     """Newton's method did not reach an orbit; says why."""
+
+
+@contextmanager
+def _told_as_not_followed() -> Iterator[None]:
+    """Raise what a run or an equation refuses as an orbit that was not reached."""
+    try:
+        yield
+    except (SimulationError, ParameterError) as error:
+        raise NotFollowedError(str(error).split(";")[0]) from error
+    except np.linalg.LinAlgError as error:
+        raise NotFollowedError("the equations have no single solution there") from error
 
 
 @dataclass(frozen=True)
@@ -111,7 +127,7 @@ class OrbitFamily:
         end = self.weight * self._after(x, s, point.phase, last, along)
         moved = self.weight * (along.vectors[0] + slope * point.tangent[-1])
         tangent = np.append(moved, point.tangent[-1])
-        return np.append(end, s), tangent / np.linalg.norm(tangent)
+        return np.append(end, s), tangent / matrices.norm(tangent)
 
     def _after(self, x: Array, s: float, begun: float, ended: float, along: Tangents | None = None) -> Array:
         """Physical state (n_states,) at one phase of the motion from that of ``x`` at another, with the field at s."""
@@ -133,7 +149,16 @@ class OrbitFamily:
         return self if phase == self.phase else replace(self, phase=phase)
 
     def solve(
-        self, guess: Array, normal: Array, slope: Array | None = None, *, closed: float = CLOSED, exact: bool = True
+        self,
+        guess: Array,
+        normal: Array,
+        slope: Array | None = None,
+        *,
+        near: tuple[Array, ...] = (),
+        closed: float = CLOSED,
+        exact: bool = True,
+        measured: bool = True,
+        patient: bool = True,
     ) -> OrbitPoint:
         """The orbit nearest to a guess on the plane through it that is normal to ``normal`` (n + 1,).
 
@@ -143,45 +168,93 @@ class OrbitFamily:
         ----------
         slope : (n,)
             dP/ds as far as it is known.
+        near : (n, n) each
+            Derivatives of the map at orbits nearby, in scaled coordinates. Where a derivative costs several runs,
+            Broyden's method starts from each until it converges.
         closed
             Miss that suffices, relative to the size of the motion.
         exact
             Measure dP/ds at the orbit; otherwise what Newton's method learned of it serves.
+        measured
+            Measure the derivative of the map too; otherwise what Broyden's method learned of it serves where it
+            converged, and the multipliers are rough.
+        patient
+            Go on by Newton's method where Broyden's does not converge.
 
         Raises
         ------
         NotFollowedError
             If there is none near, or the motion can't be followed.
         """
-        try:
-            x, matrix, slope, run = self._solve(guess, normal, slope, closed)
+        with _told_as_not_followed():
+            iterations = MOST_ITERATIONS
+            if near and slope is not None and self.machine.moving.costly:
+                root = self._neared(guess, normal, slope, near, closed)
+                guess, slope = root.x, root.derivative[:, -1]
+                if root.miss <= max(closed, 4.0 * self.noise) and not measured:
+                    _, cycles, machine = self._turn(guess[-1])
+                    run = run_period(machine, self.state(guess), cycles)
+                    return self._point(guess, root.derivative[:, :-1], slope, run, normal, measured=False)
+                if not patient and not root.miss < CLOSED:
+                    raise NotFollowedError("Broyden's method does not converge")
+                closed, iterations = max(closed, root.miss) if root.miss < CLOSED else closed, FEW_ITERATIONS
+            x, matrix, slope, run = self._solve(guess, normal, slope, closed, iterations)
             return self._point(x, matrix, self.slope(x, run.end) if exact else slope, run, normal)
-        except (SimulationError, ParameterError) as error:
-            raise NotFollowedError(str(error).split(";")[0]) from error
-        except np.linalg.LinAlgError as error:
-            raise NotFollowedError("the equations have no single solution there") from error
+
+    def measured(self, point: OrbitPoint, *, exact: bool = True) -> OrbitPoint:
+        """An orbit with its derivative measured, and dP/ds where ``exact``.
+
+        Raises
+        ------
+        NotFollowedError
+            If the motion can't be followed.
+        """
+        if point.measured:
+            return point
+        with _told_as_not_followed():
+            along = point.tangent
+            x, matrix, slope, run = self._solve(point.x, along, point.slope, CLOSED, FEW_ITERATIONS)
+            return self._point(x, matrix, self.slope(x, run.end) if exact else slope, run, along)
+
+    def _neared(self, guess: Array, normal: Array, slope: Array, near: tuple[Array, ...], closed: float) -> Root:
+        """Unknowns nearer to an orbit by Broyden's method, from the first derivative nearby with which it converges.
+
+        The miss is relative to the size of the motion, and the derivative is that of the map.
+        """
+        size = max(float(matrices.norm(guess[:-1])), 1e-300)
+        closed, one = max(closed, 4.0 * self.noise), np.eye(len(slope), len(guess))
+        best: Root | None = None
+        for each in near:
+            derivative = np.column_stack([each, slope]) - one
+            root = root_near(self.miss, guess, derivative, closed * size, normal)
+            root = root._replace(derivative=root.derivative + one, miss=root.miss / size)
+            best = root if best is None or root.miss < best.miss else best
+            if best.miss <= closed:
+                break
+        assert best is not None
+        return best
 
     def _solve(
-        self, guess: Array, normal: Array, slope: Array | None, closed: float
+        self, guess: Array, normal: Array, slope: Array | None, closed: float, iterations: int
     ) -> tuple[Array, Array, Array, Period]:
         """(x, matrix, slope, run) of an orbit."""
         x, last = guess, np.inf
         enough, closed = max(CLOSED, 4.0 * self.noise), max(closed, 4.0 * self.noise)
         miss, matrix, run = self._map(x)
         slope = self.slope(x, run.end) if slope is None else slope
-        for _ in range(MOST_ITERATIONS):
-            size = float(np.linalg.norm(miss)) / max(float(np.linalg.norm(x[:-1])), 1e-300)
+        for _ in range(iterations):
+            size = float(matrices.norm(miss)) / max(float(matrices.norm(x[:-1])), 1e-300)
             if not np.isfinite(size) or size > 2.0 * max(last, 1e-2):
                 break
-            if size < closed or (size < enough and size > 0.1 * last):
+            if size <= closed or (size < enough and size > 0.1 * last):
                 return x, matrix, slope, run
-            wanted = -np.append(miss, normal @ (x - guess))
-            step = np.asarray(np.linalg.solve(_bordered(matrix, slope, normal), wanted), dtype=float)
+            wanted = -np.append(miss, product(normal, x - guess))
+            step = np.asarray(matrices.solve(_bordered(matrix, slope, normal), wanted), dtype=float)
             last, before = size, matrix
             x, change, (miss, matrix, run) = self._damped(x, step, size)
             if abs(change[-1]) > max(NOISE, 100.0 * self.noise):
                 # the new miss tells more of dP/ds than a difference does near grazing
-                slope = slope + (miss - 0.5 * (matrix - before) @ change[:-1]) / change[-1]
+                slope = slope + (miss - 0.5 * product(matrix - before, change[:-1])) / change[-1]
         raise NotFollowedError("Newton's method does not converge")
 
     def _damped(self, x: Array, change: Array, size: float) -> tuple[Array, Array, tuple[Array, Array, Period]]:
@@ -189,16 +262,20 @@ class OrbitFamily:
 
         The step is halved while it makes the miss larger: at grazing it overshoots from one side to the other.
         """
-        found = self._map(x + change)
-        for _ in range(MOST_HALVINGS):
-            if float(np.linalg.norm(found[0])) < size * max(float(np.linalg.norm(x[:-1])), 1e-300) or size > ROUGH:
+        enough = size * max(float(matrices.norm(x[:-1])), 1e-300)
+        derived = not self.machine.moving.costly
+        for halvings in range(MOST_HALVINGS + 1):
+            found = self._map(x + change) if derived else None
+            miss = self.miss(x + change) if found is None else found[0]
+            if float(matrices.norm(miss)) < enough or size > ROUGH or halvings == MOST_HALVINGS:
                 break
             change = 0.5 * change
-            found = self._map(x + change)
-        return x + change, change, found
+        return x + change, change, found or self._map(x + change)
 
-    def _point(self, x: Array, matrix: Array, slope: Array, run: Period, along: Array) -> OrbitPoint:
-        tangent = np.linalg.solve(_bordered(matrix, slope, along), np.append(np.zeros(len(matrix)), 1.0))
+    def _point(
+        self, x: Array, matrix: Array, slope: Array, run: Period, along: Array, measured: bool = True
+    ) -> OrbitPoint:
+        tangent = matrices.solve(_bordered(matrix, slope, along), np.append(np.zeros(len(matrix)), 1.0))
         force, spent = run.arrays.peak_force.max(axis=0), run.arrays.contact_time.sum(axis=0)
         if self.mirrored:
             force, spent = np.full_like(force, force.max()), np.full_like(spent, spent.sum())
@@ -208,20 +285,22 @@ class OrbitFamily:
         )
         return OrbitPoint(
             x=x,
-            matrix=matrix @ matrix if self.mirrored else matrix,
+            matrix=product(matrix, matrix) if self.mirrored else matrix,
+            solved=matrix,
             slope=slope,
-            tangent=tangent / np.linalg.norm(tangent),
+            tangent=tangent / matrices.norm(tangent),
             impacts=self._contacts(run),
             peaks=force,
             symmetric=alike and self.period % 2 == 1 and float(force.max()) > 0.0,
             halved=self.period % 2 == 0 and self._same(run.arrays.section[self.period // 2], run.arrays.section[0]),
             phase=self.phase,
+            measured=measured,
         )
 
     def _same(self, one: Array, other: Array) -> bool:
         """True if two physical states are one."""
-        size = float(np.linalg.norm(self.weight * other))
-        return float(np.linalg.norm(self.weight * (one - other))) <= HALVED * max(size, 1e-300)
+        size = float(matrices.norm(self.weight * other))
+        return float(matrices.norm(self.weight * (one - other))) <= HALVED * max(size, 1e-300)
 
     def _map(self, x: Array) -> tuple[Array, Array, Period]:
         """Miss of a scaled state, derivative of the map and the run."""
@@ -247,8 +326,8 @@ class OrbitFamily:
             middle = float(np.clip(x[-1], step, 1.0 - step))
             low, high = (self.end(x, middle + side) for side in (-step, step))
             sign = -1.0 if self.mirrored else 1.0
-            bend = np.linalg.norm(low + high - 2.0 * sign * self.weight * ended) if middle == x[-1] else 0.0
-            if bend < BENT * np.linalg.norm(high - low):
+            bend = matrices.norm(low + high - 2.0 * sign * self.weight * ended) if middle == x[-1] else 0.0
+            if bend < BENT * matrices.norm(high - low):
                 break
         return np.asarray((high - low) / (2.0 * step))
 
@@ -265,11 +344,9 @@ class OrbitFamily:
         NotFollowedError
             If the motion can't be followed.
         """
-        try:
+        with _told_as_not_followed():
             _, cycles, machine = self._turn(x[-1])
             return self._contacts(run_period(machine, self.state(x), cycles))
-        except (SimulationError, ParameterError) as error:
-            raise NotFollowedError(str(error).split(";")[0]) from error
 
     def tangent(self, x: Array, along: Array) -> Array:
         """Unit tangent (n + 1,) of the orbits of the map as it is at x, near an orbit, turned along ``along``.
@@ -279,17 +356,15 @@ class OrbitFamily:
         NotFollowedError
             If the motion can't be followed, or the tangent is not determined.
         """
-        try:
+        with _told_as_not_followed():
             _, matrix, run = self._map(x)
             slope = self.slope(x, run.end)
-            tangent = np.linalg.solve(_bordered(matrix, slope, along), np.append(np.zeros(len(matrix)), 1.0))
-        except (SimulationError, ParameterError, np.linalg.LinAlgError) as error:
-            raise NotFollowedError(str(error).split(";")[0]) from error
-        return np.asarray(tangent / np.linalg.norm(tangent))
+            tangent = matrices.solve(_bordered(matrix, slope, along), np.append(np.zeros(len(matrix)), 1.0))
+        return np.asarray(tangent / matrices.norm(tangent))
 
     def miss(self, x: Array) -> Array:
         """Miss (n,) of scaled unknowns after one period."""
-        return self._map(x)[0]
+        return self.end(x, x[-1]) - x[:-1]
 
     def with_period(self, period: int) -> "OrbitFamily":
         """The family of another period."""

@@ -7,6 +7,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from chaosgym.arrays import Array
+from chaosgym.core import matrices
 
 
 @dataclass(frozen=True, eq=False)
@@ -19,6 +20,8 @@ class OrbitPoint:
         Scaled state z on the section, and s.
     matrix : (n, n)
         Derivative of the map of one period in scaled coordinates; its eigenvalues are the Floquet multipliers.
+    solved : (n, n)
+        Derivative of the map that was solved: of half a period on orbits of a mirrored family.
     slope : (n,)
         dP/ds.
     tangent : (n + 1,)
@@ -33,10 +36,13 @@ class OrbitPoint:
         True if the orbit closes after half the period too: it is one of half the period.
     phase
         Of the section, in cycles.
+    measured
+        False if the derivative is what Broyden's method learned of it: good for steps, not for multipliers.
     """
 
     x: Array
     matrix: Array
+    solved: Array
     slope: Array
     tangent: Array
     impacts: tuple[int, ...]
@@ -44,12 +50,13 @@ class OrbitPoint:
     symmetric: bool
     halved: bool
     phase: float
+    measured: bool = True
 
     @cached_property
     def multipliers(self) -> NDArray[np.complex128]:
         """Floquet multipliers (n,), largest modulus first."""
-        values = np.asarray(np.linalg.eigvals(self.matrix), dtype=complex)
-        return values[np.argsort(-np.abs(values))]
+        values = np.asarray(matrices.eigvals(self.matrix), dtype=complex)
+        return values[np.argsort(-matrices.modulus(values), kind="stable")]
 
     @property
     def largest_multiplier(self) -> float:

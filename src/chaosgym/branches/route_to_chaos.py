@@ -16,7 +16,7 @@ M. J. Feigenbaum, J. Stat. Phys. 19 (1978) 25-52. Y. Pomeau, P. Manneville, Comm
 from collections.abc import Callable, Sequence
 from contextlib import suppress
 from itertools import groupby, pairwise
-from typing import Any, Literal, NamedTuple
+from typing import Literal, NamedTuple
 
 import numpy as np
 from tqdm import tqdm
@@ -79,10 +79,6 @@ class Onset(NamedTuple):
         """One line for people."""
         told = "route not told" if self.route == "not told" else self.route
         return f"chaos between {self.periodic:.6g} and {self.chaotic:.6g}: {told}; {self.because}"
-
-    def as_dict(self) -> dict[str, Any]:
-        """Return plain values for JSON."""
-        return self._asdict()
 
 
 def routes_to_chaos(diagram: BifurcationDiagram) -> tuple[Onset, ...]:

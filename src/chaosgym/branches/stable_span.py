@@ -1,7 +1,7 @@
 """How far a motion stays stable along the speed: where one falls out of it on the way up and on the way down."""
 
 from dataclasses import replace
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 
@@ -14,6 +14,9 @@ from chaosgym.branches.section import better_section
 from chaosgym.diagnosis.periodic_orbit import PeriodicOrbit
 from chaosgym.machines import Machine
 from chaosgym.machines.parameters import parameters_of
+
+MOST_ORBITS = 120
+"""Orbits on either side: of worn pins, which bounce many times a cycle, one takes some 25 ms."""
 
 
 class End(NamedTuple):
@@ -37,10 +40,6 @@ class StableSpan(NamedTuple):
         """Both ends for people, such as "stable from 1.17834 Hz (fold) to 1.90683 Hz (fold)"."""
         ends = (f"{end.speed:.6g} {unit} ({end.kind or end.reason or 'end of the range'})" for end in self)
         return "stable from {} to {}".format(*ends)
-
-    def as_dict(self) -> dict[str, Any]:
-        """Return plain values for JSON."""
-        return {"below": self.below._asdict(), "above": self.above._asdict()}
 
 
 def stable_span(machine: Machine, orbit: PeriodicOrbit) -> StableSpan:
@@ -78,7 +77,7 @@ def stable_span(machine: Machine, orbit: PeriodicOrbit) -> StableSpan:
 def _end(family: OrbitFamily, start: OrbitPoint, side: float) -> End:
     begun = replace(start, tangent=side * start.tangent)
     try:
-        ahead = stretch(family, begun, until=lambda one: one.loses_stability, closely=False)
+        ahead = stretch(family, begun, until=lambda one: one.loses_stability, closely=False, most_points=MOST_ORBITS)
     except NotFollowedError as error:
         return End(family.value(start.x[-1]), None, f"not followed: {error}")
     lost = [each.bifurcation for each in ahead.found if each.bifurcation.loses_stability or each.bifurcation.ends]

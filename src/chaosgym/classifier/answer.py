@@ -1,22 +1,21 @@
-"""Answers of the classifier: type and nature of a machine; irregularity and nature of a record.
+"""Answers of the classifier about a machine: type and nature.
 
 The type follows from the natures of a cross by the printed rule (``diagnosis.type_rule``). Where a nature is only
 probable, the type's probabilities are those of the rule over every combination of natures.
 """
 
 from collections.abc import Mapping, Sequence
-from dataclasses import asdict, dataclass, replace
+from dataclasses import dataclass
 from itertools import product
-from typing import Any
 
 from chaosgym.diagnosis import default_tolerances
 from chaosgym.diagnosis.type_rule import CROSS, type_of_cross
 from chaosgym.machines import Machine
-from chaosgym.series import Diagnosis
+from chaosgym.plain import Result
 
 
 @dataclass(frozen=True, kw_only=True)
-class NatureAnswer:
+class NatureAnswer(Result):
     """Nature of one machine, as far as it was followed.
 
     Attributes
@@ -43,6 +42,8 @@ class NatureAnswer:
         Processor time that it took.
     """
 
+    shows = "nature probability proven stage"
+
     nature: str | None
     probabilities: Mapping[str, float]
     proven: bool
@@ -61,18 +62,20 @@ class NatureAnswer:
 
 
 @dataclass(frozen=True, kw_only=True)
-class Classification:
+class Classification(Result):
     """Answer for one machine.
 
     Attributes
     ----------
     response_type
-        "I", "II" or "III" by the printed rule from centre and neighbours; None if that is too close to call, or was
-        not asked for or not within the budget: ``type_reason``.
+        "I", "II" or "III" by the printed rule from one run of the centre and one of each neighbour; None if that is
+        too close to call, or was not asked for or not within the budget: ``type_reason``.
     type_probabilities
         From the natures' probabilities of the five points; empty without a type.
     type_proven
         Whether every nature that the type rests on is proven.
+    begun
+        Where these runs begin: "rest", or "its initial state".
     centre
         Nature of the machine itself.
     neighbours
@@ -81,13 +84,27 @@ class Classification:
         Processor time of the whole answer.
     """
 
+    shows = (
+        "nature=centre.nature proven=centre.proven stage=centre.stage cycles=centre.cycles period=centre.period "
+        "largest_peak=centre.largest_peak plausible=centre.plausible reason=centre.reason "
+        "nature_probabilities=centre.probabilities probability=centre.probability abstained response_type "
+        "type_probabilities type_proven type_reason searched nature_microseconds=centre.microseconds microseconds "
+        "neighbours"
+    )
+
     response_type: str | None
     type_probabilities: Mapping[str, float]
     type_proven: bool
     type_reason: str
+    begun: str
     centre: NatureAnswer
     neighbours: tuple[NatureAnswer, ...]
     microseconds: float
+
+    @property
+    def searched(self) -> str:
+        """How far was looked for other motions."""
+        return f"judged by runs from {self.begun} alone; `chaosgym diagnose --types` looks for other motions"
 
     @property
     def nature(self) -> str | None:
@@ -98,96 +115,6 @@ class Classification:
     def abstained(self) -> bool:
         """Whether not even the nature is answered."""
         return self.centre.nature is None
-
-    def as_dict(self) -> dict[str, Any]:
-        """Return plain values for JSON; those of the centre stand beside those of the type."""
-        centre = asdict(self.centre)
-        centre["nature_probabilities"] = centre.pop("probabilities")
-        return {
-            **centre,
-            "plausible": list(self.centre.plausible),
-            "probability": self.centre.probability,
-            "abstained": self.abstained,
-            "response_type": self.response_type,
-            "type_probabilities": dict(self.type_probabilities),
-            "type_proven": self.type_proven,
-            "type_reason": self.type_reason,
-            "nature_microseconds": self.centre.microseconds,
-            "microseconds": self.microseconds,
-            "neighbours": [
-                {"nature": point.nature, "probability": point.probability, "proven": point.proven, "stage": point.stage}
-                for point in self.neighbours
-            ],
-        }
-
-
-@dataclass(frozen=True, kw_only=True)
-class RecordAnswer:
-    """Answer for one record of peak forces.
-
-    Attributes
-    ----------
-    irregular
-        Whether the settled response scatters by more than the sensor's error, whatever its period up to 16 cycles:
-        what a sensor can know. None if the error is not stated, or it is too close to call.
-    irregular_probability
-        None if the error is not stated.
-    amplitude
-        By how much the record does not repeat [N]: scatter within the classes of the best period, as the half range of
-        an even spread; the sensor's error is part of it.
-    nature, nature_probabilities
-        The exact nature, which a sensor can see only where the irregularity exceeds its error; None if too close to
-        call.
-    period
-        Cycles after which a regular record repeats; None otherwise.
-    plausible
-        Natures that hold the truth with 90 % coverage, whichever it is.
-    abstained, reason
-        Whether neither question is answered, and why.
-    warning
-        What the record contradicts, such as the stated error; empty if nothing.
-    """
-
-    irregular: bool | None
-    irregular_probability: float | None
-    amplitude: float | None
-    nature: str | None
-    nature_probabilities: Mapping[str, float]
-    period: int | None
-    plausible: tuple[str, ...]
-    abstained: bool
-    reason: str
-    warning: str = ""
-
-    def as_dict(self) -> dict[str, Any]:
-        """Return plain values for JSON."""
-        return {**asdict(self), "plausible": list(self.plausible)}
-
-    def under(self, verdict: Diagnosis) -> "RecordAnswer":
-        """Return the answer under the verdict of ``chaosgym.judge_peaks`` on the same record, which decides.
-
-        The classifier has learned from machines alone and takes many random records for chaos. Its probabilities stand
-        where it names the nature of the verdict; elsewhere ``reason`` says why there are none. Then it has abstained
-        where the verdict is undetermined. What it says of irregularity falls where the verdict contradicts.
-
-        Examples
-        --------
-        >>> import numpy as np
-        >>> peaks = 100.0 + 6.0 * np.random.default_rng(0).normal(size=300)  # white noise
-        >>> learned = chaosgym.default_classifier("impact-beam").classify_record(peaks)
-        >>> learned.nature, learned.under(chaosgym.judge_peaks(peaks).diagnosis).nature
-        ('chaotic', 'undetermined')
-        """
-        answer = self
-        if self.irregular is (verdict.nature == "periodic") and not verdict.condition:
-            answer = replace(answer, irregular=None, irregular_probability=None)
-        if self.nature != verdict.nature:
-            why = self.reason
-            if self.nature is not None:
-                undecided = verdict.nature == "undetermined"
-                why = f"the verdict {'is undetermined' if undecided else 'contradicts what is learned'}"
-            answer = replace(answer, nature_probabilities={}, plausible=(), reason=why or "too close to call")
-        return replace(answer, nature=verdict.nature, period=verdict.period, abstained=verdict.nature == "undetermined")
 
 
 NEGLIGIBLE = 1e-3

@@ -16,8 +16,9 @@ from tqdm import tqdm
 from chaosgym.classifier.features import MAX_CYCLES
 from chaosgym.classifier.machine_classifier import MachineClassifier
 from chaosgym.errors import DatasetError, ParameterError
-from chaosgym.files import parquet_of, write_atomically
+from chaosgym.files import write_atomically
 from chaosgym.machines.parameters import parameters_of, with_settings
+from chaosgym.parquet import parquet_of
 
 RECORDS, SENSOR_ERROR = "peak_force", "sensor_error"
 

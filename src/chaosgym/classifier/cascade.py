@@ -197,7 +197,7 @@ def _go_on(now: _Progress, machine: Machine, cycles: int) -> CycleRecord:
 
 def _proof(machine: Machine, record: CycleRecord, began: float, budget_us: float | None) -> PeriodicOrbit | None:
     """The periodic orbit that the run nears, if the budget holds Newton's method and it proves one."""
-    period = returning_period(record.section, LONGEST_PERIOD, REPEATS, RETURNED)
+    period = returning_period(record.states, LONGEST_PERIOD, REPEATS, RETURNED)
     if not _affordable(machine, began, budget_us, 0, period):
         return None
     return proven_orbit(machine, record, period)[0]

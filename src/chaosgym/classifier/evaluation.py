@@ -26,7 +26,7 @@ LENGTHS = (8, 16, 32, 64)
 """Cycles of the records that are judged."""
 
 
-class Estimate(NamedTuple):
+class ScoreInterval(NamedTuple):
     """A figure and its 95 % bootstrap interval."""
 
     value: float
@@ -51,9 +51,9 @@ def bootstrap_scores(truth: NDArray[Any], guess: NDArray[Any], groups: NDArray[A
     return {"accuracy": _estimate(accuracy), "balanced_accuracy": _estimate(balanced)}
 
 
-def _estimate(values: Array) -> Estimate:
+def _estimate(values: Array) -> ScoreInterval:
     low, high = np.quantile(values[1:], [0.5 - 0.5 * LEVEL, 0.5 + 0.5 * LEVEL])
-    return Estimate(float(values[0]), float(low), float(high))
+    return ScoreInterval(float(values[0]), float(low), float(high))
 
 
 def probability_scores(

@@ -21,7 +21,7 @@ from chaosgym.arrays import Array
 from chaosgym.classifier.kernels import records as kernels
 from chaosgym.classifier.kernels.records import CLASSES, LAGS, class_scatter, fill_features, true_length
 from chaosgym.classifier.parameter_features import ParameterScaling, parameter_features
-from chaosgym.core.compilation import call
+from chaosgym.core.compilation import call_or_interpret
 from chaosgym.errors import DiagnosisError
 
 MIN_CYCLES, MAX_CYCLES = 8, 64
@@ -151,7 +151,7 @@ def response_features(
         errors = np.full(len(peaks), np.nan) if sensor_error is None else sensor_error
         features = np.full((len(peaks), _COUNT), np.nan)
         single = (np.ascontiguousarray(part.astype(np.float32).astype(float)) for part in (peaks, states))
-        call(fill_features, *single, errors, features)
+        call_or_interpret(fill_features, *single, errors, features)
         parts.append(features)
     return parts[0] if len(parts) == 1 else np.concatenate(parts, axis=1)
 
@@ -163,9 +163,9 @@ def record_amplitude(peaks: Array) -> Array:
     """
     out = np.empty(len(peaks))
     for index, row in enumerate(peaks):
-        record = row[: call(true_length, row)]
+        record = row[: call_or_interpret(true_length, row)]
         periods = range(1, min(CLASSES, len(record) // REPEATS) + 1)
-        out[index] = np.sqrt(3.0) * min(call(class_scatter, record, period) for period in periods)
+        out[index] = np.sqrt(3.0) * min(call_or_interpret(class_scatter, record, period) for period in periods)
     return out
 
 
@@ -174,8 +174,8 @@ def least_scatter(peaks: Array) -> float:
 
     The plain rule: a response is irregular to a sensor whose largest error is smaller.
     """
-    record = peaks[: call(true_length, peaks)]
-    return float(call(kernels.least_scatter, record, min(CLASSES, len(record) // REPEATS)))
+    record = peaks[: call_or_interpret(true_length, peaks)]
+    return float(call_or_interpret(kernels.least_scatter, record, min(CLASSES, len(record) // REPEATS)))
 
 
 def repeat_period(peaks: ArrayLike) -> int:
@@ -184,7 +184,7 @@ def repeat_period(peaks: ArrayLike) -> int:
     record = record[~np.isnan(record)]
     best, period = np.inf, 1
     for candidate in range(1, min(CLASSES, len(record) // REPEATS) + 1):
-        scatter = call(class_scatter, record, candidate)
+        scatter = call_or_interpret(class_scatter, record, candidate)
         if scatter < IMPROVEMENT * best - 1e-9 * abs(record).max():
             best, period = scatter, candidate
         best = min(best, scatter)

@@ -21,7 +21,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from chaosgym.arrays import Array
-from chaosgym.classifier.answer import Classification, NatureAnswer, RecordAnswer, neighbours_of, type_probabilities
+from chaosgym.classifier.answer import Classification, NatureAnswer, neighbours_of, type_probabilities
 from chaosgym.classifier.cascade import CLEAR, MILLION, judge_nature
 from chaosgym.classifier.estimator import ResponseClassifier
 from chaosgym.classifier.features import as_records, response_features
@@ -30,6 +30,7 @@ from chaosgym.classifier.storage import read_model, write_model
 from chaosgym.errors import DiagnosisError, ModelFileError, ParameterError
 from chaosgym.machines import MACHINES, Machine
 from chaosgym.machines.parameters import parameters_of
+from chaosgym.recordings.record_answer import RecordAnswer
 
 PEAK_CYCLES = 16
 """Cycles from rest that the largest peak of a neighbourhood's point rests on at least, unless an orbit is proven."""
@@ -127,6 +128,7 @@ class MachineClassifier:
             type_probabilities=told[0],
             type_proven=bool(points) and all(point.proven for point in (centre, *points)),
             type_reason=told[1] if clear or not likely else f"too close to call: Type {likely} has {probability:.2f}",
+            begun=machine.begins_from(),
             centre=centre,
             neighbours=tuple(points),
             microseconds=MILLION * (thread_time() - began),
@@ -237,7 +239,7 @@ class MachineClassifier:
         if name not in self.records:
             raise ModelFileError(
                 f"no classifier of records is trained for {self.machine.name}: `chaosgym judge` judges them "
-                "without one, and `chaosgym sweep --signals SHARE` gives data to train one on"
+                "without one, and `chaosgym sweep --label signals=SHARE` gives data to train one on"
             )
         return self.records[name]
 

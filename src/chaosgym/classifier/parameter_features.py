@@ -29,7 +29,7 @@ from numpy.typing import NDArray
 
 from chaosgym.arrays import Array
 from chaosgym.classifier.kernels.parameters import FREE, RINGING, fill_features
-from chaosgym.core.compilation import call
+from chaosgym.core.compilation import call_or_interpret
 from chaosgym.machines import Machine
 from chaosgym.machines.parameters import parameters_of, with_settings
 
@@ -158,5 +158,5 @@ def feature_count(scaling: ParameterScaling) -> int:
 def parameter_features(scaling: ParameterScaling, values: Array) -> Array:
     """Features (n, n_features) of parameter values (n, n_fields); NaN where a logarithm does not exist."""
     out = np.empty((len(values), feature_count(scaling)))
-    call(fill_features, *scaling[:-1], *scaling.swing, np.ascontiguousarray(values, dtype=float), out)
+    call_or_interpret(fill_features, *scaling[:-1], *scaling.swing, np.ascontiguousarray(values, dtype=float), out)
     return out

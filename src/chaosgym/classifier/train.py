@@ -217,7 +217,7 @@ def _counts(examples: Examples) -> dict[str, Any]:
 
 
 def _card(sweep: LabelledSweep, examples: Examples, report: dict[str, Any], seed: int) -> dict[str, Any]:
-    kept = ("sampling", "size", "seed", "budget", "signals", "axes")
+    kept = ("sampling", "size", "seed", "budget", "signals", "axes", "definition")
     return {
         "machine": examples.machine.name,
         "base": {name: getattr(examples.machine, name) for name in parameters_of(examples.machine)},
@@ -232,11 +232,17 @@ def _card(sweep: LabelledSweep, examples: Examples, report: dict[str, Any], seed
         "command": f"chaosgym train-classifier --data FOLDER --out FOLDER --seed {seed}",
         "limits": (
             "knows machines that differ from the base in the named fields, within their ranges; the nature is that of "
-            "the diagnosis within its budget, from rest; transient chaos counts as chaotic although its settled record "
-            "is periodic; chaos weaker than the sensor's error looks periodic to any sensor"
+            f"the diagnosis within its budget, from rest; {_died_out(sweep)}; chaos weaker than the sensor's error "
+            "looks periodic to any sensor"
         ),
         "report": report,
     }
+
+
+def _died_out(sweep: LabelledSweep) -> str:
+    if sweep.definition == "settled":
+        return "of chaos that dies out it is that of the motion that is left"
+    return "transient chaos counts as chaotic although its settled record is periodic"
 
 
 def card_lines(card: dict[str, Any] | Any) -> list[str]:

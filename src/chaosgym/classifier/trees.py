@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from chaosgym.arrays import Array
 from chaosgym.classifier.kernels.trees import walk_rows
-from chaosgym.core.compilation import call
+from chaosgym.core.compilation import call_or_interpret
 
 L2 = 5.0
 """Regularisation of the leaves."""
@@ -108,5 +108,5 @@ def _side_by_side(nodes: Any, start: int) -> tuple[Any, ...]:
 def class_scores(forest: Forest, features: Array) -> Array:
     """Scores (n_rows, n_classes); of two classes, for which boosting has one score, the first has zero."""
     found = np.empty((len(features), len(forest.baseline)))
-    call(walk_rows, *forest, features, found)
+    call_or_interpret(walk_rows, *forest, features, found)
     return np.concatenate([np.zeros_like(found), found], axis=1) if found.shape[1] == 1 else found

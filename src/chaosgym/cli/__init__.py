@@ -10,19 +10,21 @@ import errno
 import gc
 import os
 import sys
+import warnings
 from importlib import import_module
 from typing import NoReturn
 
 import click
 
 from chaosgym.cli.interrupt import ABORTED, heard_at_once
-from chaosgym.errors import ChaosgymError, SimulationError, UnfinishedError
+from chaosgym.errors import ChaosgymError, SimulationError, UnfinishedError, nearest_or
 from chaosgym.version import __version__
 
 COMMANDS = {
     "simulate": "simulate:simulate",
     "show": "simulate:show",
     "new-machine": "simulate:new_machine",
+    "export": "export:export",
     "diagnose": "diagnose:diagnose",
     "judge": "judge:judge",
     "judge-sweep": "judge:judge_sweep",
@@ -45,7 +47,7 @@ COMMANDS = {
 }
 """Module in this folder and function of every command."""
 
-RESPELT = {"diagnose", "overlay", "classify", "design"}
+RESPELT = {"diagnose", "overlay", "classify", "design", "judge", "judge-sweep", "run-up", "fit", "monitor", "sweep"}
 """Commands with former spellings."""
 
 MOVED = {
@@ -63,7 +65,7 @@ BEYOND_THE_USER = (errno.ENOSPC, errno.EDQUOT, errno.EIO, errno.EROFS, errno.EFB
 
 
 class Group(click.Group):
-    """A group that says what took the place of a command that it had."""
+    """A group that says what took the place of a command that it had, and which one was probably meant."""
 
     def resolve_command(
         self, ctx: click.Context, args: list[str]
@@ -72,6 +74,10 @@ class Group(click.Group):
         name = f"{ctx.info_name} {args[0]}" if ctx.parent else args[0]
         if name in MOVED:
             raise click.UsageError(f"there is no {name} any more: {MOVED[name]}", ctx)
+        names = self.list_commands(ctx)
+        if args[0] not in names and not args[0].startswith("-"):
+            hint = nearest_or(f"allowed: {', '.join(names)}", args[0], names)
+            raise click.UsageError(f"there is no command {args[0]}; {hint}", ctx)
         return super().resolve_command(ctx, args)
 
 
@@ -80,11 +86,17 @@ class Commands(Group):
 
     def parse_args(self, ctx: click.Context, args: list[str]) -> list[str]:
         """Parse the arguments, in their former spelling too."""
-        if args[:1] and args[0] in RESPELT and not ctx.resilient_parsing:
+        if not ctx.resilient_parsing and args[:1] and args[0] in RESPELT and self._unknown_options(ctx, args):
             from chaosgym.cli.former import rewritten
 
             args = rewritten(args)
         return super().parse_args(ctx, args)
+
+    def _unknown_options(self, ctx: click.Context, args: list[str]) -> set[str]:
+        """Options that the command does not have by itself: those of a machine, former ones and slips."""
+        command = self.get_command(ctx, args[0])
+        stated = {word.partition("=")[0] for word in args[1:] if word.startswith("--")}
+        return stated if command is None else stated - {name for one in command.params for name in one.opts}
 
     def list_commands(self, ctx: click.Context) -> list[str]:
         """Return the names of all commands."""
@@ -113,6 +125,7 @@ def main() -> None:
 def run_command(command: click.Command) -> None:
     """Run a command line: one clear line instead of a traceback for every error that chaosgym raises on purpose."""
     _use_one_blas_thread()
+    warnings.formatwarning = lambda message, *_, **__: f"note: {message}\n"  # without a line of code
     gc.set_threshold(RARELY, 50, 100)
     atexit.register(gc.freeze)  # a last search for garbage takes as long as a short question
     try:
@@ -129,6 +142,8 @@ def run_command(command: click.Command) -> None:
         _end(error, 1)
     except ChaosgymError as error:
         _end(error, 2)
+    except MemoryError as error:
+        _end(f"there is not enough memory{': ' if str(error) else ''}{error}", 1)
     except OSError as error:
         _drop_unwritten_output()
         _end(error, 1 if error.errno in BEYOND_THE_USER else 2)

@@ -1,20 +1,25 @@
 """The commands ``compare`` and ``run-agent``: how controllers and trained agents do on machines."""
 
 import json
+from contextlib import nullcontext
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import click
 
 from chaosgym.cli.options import Quantity
-from chaosgym.cli.output import AS_JSON, emit, patience, picture_path, plot_option
+from chaosgym.cli.output import AS_JSON, DIAGNOSED, announce, emit, patience, picture_path, plot_option
 
 if TYPE_CHECKING:
+    from chaosgym.control.operator import Operator
+    from chaosgym.control.plant import Interrupted, PlantError, Worked
     from chaosgym.control.rollout import Played
+    from chaosgym.plants.fmu import FmuPlant
+    from chaosgym.plants.plant import Plant
 
 
 OBJECTIVES = ("irregular", "life", "both")
-LEVELS, SPLITS = ("nominal", "clearance", "wear", "fleet"), ("train", "test", "outside", "other_machines")
+LEVELS, SPLITS = ("nominal", "clearance", "wear", "fleet"), ("train", "test", "outside", "corner", "other_machines")
 """Of a task; the names are repeated here so that help needs no environment."""
 
 KRIGING = "kriging"
@@ -65,10 +70,12 @@ def compare(
     0 is following the demand, 1 is the machine's own map with the demands to come unknown.
     """
     from chaosgym.control.comparison import compare as run
+    from chaosgym.control.comparison import most_cycles
     from chaosgym.control.guard import GuardedPolicy
     from chaosgym.control.policies import load_policy
     from chaosgym.control.rollout import Policy
     from chaosgym.control.scores import ONE, ZERO, Scores, table_lines
+    from chaosgym.envs.vector_env import native_envs
 
     drawn = None if figure is None else picture_path(str(figure), "")
     trained: dict[str, list[Policy]] = {}
@@ -83,6 +90,9 @@ def compare(
     asked = {"level": level, "split": split, "sealed": sealed or None}
     keywords: dict[str, Any] = {name: value for name, value in asked.items() if value is not None}
     keywords |= {} if objective == OBJECTIVES[0] else {"objective": objective}
+    if not out.exists():
+        cycles = most_cycles(env, machines=machines, only=chosen, **keywords)
+        announce("compare", native_envs(env, **keywords).nominal, DIAGNOSED * cycles)
     scores = Scores(run(env, out, machines=machines, only=chosen, policies=trained, progress=True, **keywords))
     summary = scores.summary()
     if drawn is not None:
@@ -114,6 +124,14 @@ def compare(
 @click.option(
     "--plant-arg", "arguments", multiple=True, metavar="NAME=VALUE", help="Argument of CLASS; may be repeated."
 )
+@click.option(
+    "--memory",
+    type=click.Path(dir_okay=False, path_type=Path),
+    help="File in which a learned map keeps what it felt, for the next job of the same plant.",
+)
+@click.option("--fmu", type=click.Path(dir_okay=False, path_type=Path), help="FMU of another program instead.")
+@click.option("--input", "driven", metavar="NAME", help="Variable of the FMU that is the speed.")
+@click.option("--output", "felt", multiple=True, metavar="NAME", help="That is the force; twice for two stops.")
 @plot_option("--out", formats="figure .png, .svg, .pdf or animation .gif, .mp4")
 @AS_JSON
 def run_agent(
@@ -124,6 +142,10 @@ def run_agent(
     load_rating: float | None,
     plant: str | None,
     arguments: tuple[str, ...],
+    memory: Path | None,
+    fmu: Path | None,
+    driven: str | None,
+    felt: tuple[str, ...],
     plot: str | None,
     as_json: bool,
 ) -> None:
@@ -132,27 +154,41 @@ def run_agent(
     ENV is an id such as chaosgym/ImpactBeamTolerance-v1, or the file of a machine. Where no policy is shipped or given,
     kriging looks for the speed of least load within reach: it needs no model and no training. It plays at a --plant
     too if no policy is given: a class with reset() and run(speed, cycles), which returns the largest force of each
-    cycle [N].
+    cycle [N]. An --fmu for co-simulation is a plant too. It is a program of its author, and runs with your rights.
     """
     from chaosgym.envs import environment
 
     environment(env)
-    if plant is not None:
-        if level is not None:
-            raise click.UsageError("--level is of simulated machines; leave it out with --plant")
-        if load_rating is not None:
-            raise click.UsageError("--load-rating is of simulated machines; leave it out with --plant")
+    foreign = "--plant" if plant is not None else "--fmu"
+    if plant is not None or fmu is not None:
+        if plant is not None and fmu is not None:
+            raise click.UsageError("--plant and --fmu exclude each other")
+        for name, given in (("--level", level), ("--load-rating", load_rating)):
+            if given is not None:
+                raise click.UsageError(f"{name} is of simulated machines; leave it out with {foreign}")
         if plot is not None:
-            raise click.UsageError("--out draws what a simulation tells; leave it out with --plant")
-        _at_plant(env, policy, machine, plant, arguments, as_json)
+            raise click.UsageError(f"--out draws what a simulation tells; leave it out with {foreign}")
+    if fmu is None and (driven or felt):
+        raise click.UsageError("--input and --output are of an FMU; give --fmu FILE too")
+    if fmu is not None:
+        if not driven or not felt:
+            raise click.UsageError("--fmu needs --input NAME, its speed, and --output NAME, its force")
+        _at_plant(env, policy, machine, str(fmu), arguments, memory, as_json, {"input": driven, "output": felt})
         return
+    if plant is not None:
+        _at_plant(env, policy, machine, plant, arguments, memory, as_json)
+        return
+    if memory is not None:
+        raise click.UsageError("--memory is of one plant; give --plant MODULE:CLASS or --fmu FILE too")
     if arguments:
-        raise click.UsageError("--plant-arg is an argument of a plant; give --plant MODULE:CLASS too")
+        raise click.UsageError("--plant-arg is an argument of a plant; give --plant MODULE:CLASS or --fmu FILE too")
     out = _picture(plot, env)
     from chaosgym.control.controllers import Follow, Kriging
+    from chaosgym.control.guard import GuardedPolicy, guarded
     from chaosgym.control.policies import load_policy, shipped_policy
     from chaosgym.control.policies.shipped import shipped_folder
     from chaosgym.control.rollout import Policy, play
+    from chaosgym.envs.vector_env import native_envs
 
     agent: Policy
     keywords: dict[str, Any] = {} if level is None else {"level": level}
@@ -160,8 +196,10 @@ def run_agent(
         name, agent, keywords = KRIGING, Kriging(), keywords | {"objective": "life"}
     else:
         name, agent = "agent", load_policy(policy) if policy else shipped_policy(env, level)
+    player, envs = guarded(agent), native_envs(env, **keywords)
+    announce("run-agent", envs.nominal, 2 * DIAGNOSED * envs.task.steps * envs.task.cycles_per_step)
     with patience("run-agent"):
-        job, follow = (play(player, env, [machine], **keywords) for player in (agent, Follow()))
+        job, follow = (play(each, env, [machine], **keywords) for each in (player, Follow()))
     if out is not None:
         from chaosgym.plotting.played_job import save_job
 
@@ -171,52 +209,83 @@ def run_agent(
     result = {"agent": type(agent).__name__, **job.as_dict(), "life": life, "follow": follow.as_dict()}
     if load_rating is not None:
         result |= {"load_rating": load_rating, "life_h": [one if one != float("inf") else None for one in hours]}
+    result |= {"foreign": not bool(player.trusted[0])} if isinstance(player, GuardedPolicy) else {}
     result |= {"plot": str(out)} if out else {}
-    emit(result, as_json, lambda: _job_lines(name, job, follow, load_rating, out))
+    told = [player.statement()] if isinstance(player, GuardedPolicy) and result["foreign"] else []
+    emit(result, as_json, lambda: [*_job_lines(name, job, follow, load_rating, out), *told])
 
 
 def _at_plant(
-    env: str, policy: Path | None, machine: int, name: str, arguments: tuple[str, ...], as_json: bool
+    env: str,
+    policy: Path | None,
+    machine: int,
+    name: str,
+    arguments: tuple[str, ...],
+    memory: Path | None,
+    as_json: bool,
+    variables: dict[str, Any] | None = None,
 ) -> None:
     """A job at a machine of the user's, beside following the demand there; what was played is told in any case."""
+    from chaosgym.cli.interrupt import first_stopped
     from chaosgym.control.controllers import Follow, Kriging
-    from chaosgym.control.guard import GuardedPolicy, can_guard
     from chaosgym.control.operator import Operator
-    from chaosgym.control.plant import Lines, PlantError, Worked, plant_of, work
     from chaosgym.control.policies import load_policy
     from chaosgym.control.rollout import Policy
+    from chaosgym.plants.lines import saying_done
+    from chaosgym.plants.plant import plant_of
 
-    agent: Policy = Kriging()
-    if policy is not None:
-        trained = load_policy(policy)
-        agent = GuardedPolicy(trained) if can_guard(trained) else trained
-    name_of_agent = type(getattr(agent, "policy", agent)).__name__
-    operators = {name_of_agent: Operator(agent, env), "following the demand": Operator(Follow(), env)}
-    plant = plant_of(name, **_named_values(arguments))
-    played: dict[str, Worked] = {}
-    failure: PlantError | None = None
-    try:
-        for who, operator in operators.items():
-            played[who] = work(plant, operator, machine, name)
-    except PlantError as error:
-        failure, worked = error, error.worked
-        played |= {} if worked is None else {who: worked}
-    finally:
-        if isinstance(plant, Lines):
-            plant.done()
+    with first_stopped(), saying_done() if name == "-" and variables is None else nullcontext():
+        agent: Policy = Kriging() if policy is None else load_policy(policy)
+        agent_name = type(agent).__name__
+        operators = {agent_name: Operator(agent, env, memory=memory), "following the demand": Operator(Follow(), env)}
+        values = _named_values(arguments)
+        ports = None if variables is None else {"unit": operators[agent_name].unit, **variables}
+        plant = plant_of(name, **values) if ports is None else _fmu(name, ports | values)
+        played, failure = _worked(plant, operators, machine, name)
     if played:
         jobs = list(played.values())
-        whole = failure is None and jobs[0].damage > 0.0
-        life = jobs[1].damage / jobs[0].damage if whole else None
-        result = {"agent": name_of_agent, "env": env, "plant": name, "job": machine, **jobs[0].as_dict()}
+        life = jobs[1].damage / jobs[0].damage if failure is None and jobs[0].damage > 0.0 else None
+        result = {"agent": agent_name, "env": env, "plant": name, "job": machine, **jobs[0].as_dict()}
         result |= {"life": life, "follow": jobs[1].as_dict() if len(jobs) > 1 else None}
         result |= {} if failure is None else {"failure": str(failure)}
         told = [line for who, job in played.items() for line in job.lines(who)]
         told += [] if life is None else [f"{LIFE}: x{life:.2f} against following the demand"]
         emit(result, as_json, lambda: told)
+    if isinstance(failure, KeyboardInterrupt):
+        click.echo(failure, err=True)
     if failure is not None:
-        steps = len(jobs[-1].speed) if played else 0
-        raise PlantError(f"{failure}; {steps} steps of the job {who} were played") from failure
+        raise failure
+
+
+def _worked(
+    plant: "Plant", operators: dict[str, "Operator"], machine: int, name: str
+) -> tuple[dict[str, "Worked"], "PlantError | Interrupted | None"]:
+    """Jobs of the operators in turn, by name, and what ended one of them too early: the steps before it are kept."""
+    from chaosgym.control.plant import Interrupted, PlantError, work
+
+    played: dict[str, Worked] = {}
+    for who, operator in operators.items():
+        try:
+            played[who] = work(plant, operator, machine, name)
+            operator.keep()
+        except (PlantError, Interrupted) as error:
+            played |= {} if error.worked is None else {who: error.worked}
+            steps = 0 if error.worked is None else len(error.worked.speed)
+            error.args = (f"{error}; {steps} steps of the job {who} were played",)
+            return played, error
+    return played, None
+
+
+def _fmu(name: str, values: dict[str, Any]) -> "FmuPlant":
+    """Plant in an FMU; what it is is said before it is loaded."""
+    from chaosgym.plants.fmu import FmuPlant
+
+    try:
+        plant = FmuPlant(name, **values)
+    except TypeError as error:
+        raise click.UsageError(f"--plant-arg: {error}") from error
+    click.echo(f"note: {plant.warning}", err=True)
+    return plant
 
 
 def _named_values(arguments: tuple[str, ...]) -> dict[str, Any]:
@@ -246,7 +315,7 @@ def _picture(plot: str | None, env: str) -> Path | None:
 
 
 def _job_lines(name: str, job: "Played", follow: "Played", load_rating: float | None, out: Path | None) -> list[str]:
-    from chaosgym.design.told import hours_told
+    from chaosgym.design.texts import hours_text
 
     about = job.as_dict()
     lines = [f"{'step':>5s} {'demand':>8s} {'speed [' + job.unit + ']':>12s} {'mean peak [N]':>14s}  Type III"]
@@ -266,6 +335,6 @@ def _job_lines(name: str, job: "Played", follow: "Played", load_rating: float | 
         lines.append(f"equivalent force: {forces[0]:.1f} N, {forces[1]:.1f} N under following the demand")
         lines.append(f"{LIFE}: x{follow.damage[0] / job.damage[0]:.2f} against following the demand")
         if load_rating is not None:
-            told = [hours_told(float(one.life_hours(load_rating)[0])) for one in (job, follow)]
+            told = [hours_text(float(one.life_hours(load_rating)[0])) for one in (job, follow)]
             lines.append(f"by --load-rating {load_rating:g} N: {told[0]}, {told[1]} under following the demand")
     return [*lines, *([f"picture: {out}"] if out else [])]

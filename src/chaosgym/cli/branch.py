@@ -7,15 +7,32 @@ from typing import Any
 import click
 import numpy as np
 
-from chaosgym.cli.machine_options import machine_command
+from chaosgym.cli.machine_options import machine_command, model_over
 from chaosgym.cli.options import FloatRange
-from chaosgym.cli.output import WORKERS, check_target, emit, picture_path, plot_option, write_table
+from chaosgym.cli.output import (
+    DIAGNOSED,
+    WORKERS,
+    announce,
+    check_target,
+    emit,
+    picture_path,
+    plot_option,
+    write_table,
+)
+from chaosgym.plain import plain
+
+SAMPLED, SAMPLED_EACH = 7, 3
+"""Points of the range by which its one model is chosen: of one field, and of each of two."""
 
 SHOWN = 30
 """Branches, and bifurcations, that the table shows; all are in --out and --json."""
 
 
-@machine_command
+FIRST = "branch, before it follows orbits"
+"""What can be told beforehand: how many orbits there are, the sweep tells."""
+
+
+@machine_command(chooses="range")
 @click.option(
     "--along",
     required=True,
@@ -61,7 +78,9 @@ def branch(
     picture = picture_path(plot, f"branch-{Path(machine.name).stem}")
     if out:
         check_target(out, overwrite)
-    first = _axis(machine, along)
+    axes = [_axis(machine, text) for text in (along, against) if text is not None]
+    machine = model_over(machine, _points(machine, axes), chosen=[axis.field for axis in axes])
+    first, second = axes[0], axes[-1]
     limits: dict[str, Any] = {
         "longest_period": longest_period,
         "most_unstable": most_unstable,
@@ -70,13 +89,16 @@ def branch(
     }
     found: Any
     if against is None:
-        from chaosgym.branches.diagram_search import SWEEP, follow
+        from chaosgym.branches.diagram_search import SWEEP, SWEEP_BUDGET, SWEEP_STARTS, follow
 
+        announce(FIRST, machine, DIAGNOSED * (first.count or SWEEP) * SWEEP_BUDGET * (1 + SWEEP_STARTS))
         found = follow(machine, first.field, (first.low, first.high), sweep=first.count or SWEEP, **limits)
     else:
         from chaosgym.branches.bifurcation_map import COLUMNS, ROWS, bifurcation_map
+        from chaosgym.branches.diagram_search import SWEEP_BUDGET
 
-        second = _axis(machine, against)
+        points = (first.count or COLUMNS) * (second.count or ROWS)
+        announce(FIRST, machine, DIAGNOSED * points * SWEEP_BUDGET)
         found = bifurcation_map(
             machine,
             first.field,
@@ -89,10 +111,14 @@ def branch(
         )
     result, lines = found.as_dict(), _lines(found) if against is None else _map_lines(found)
     if against is None:
+        from chaosgym.branches.calm import calm_along
         from chaosgym.branches.route_to_chaos import routes_to_chaos
 
+        calm = calm_along(found)
+        result["calm"] = None if calm is None else calm.as_dict()
+        lines += [] if calm is None else calm.lines
         routes = routes_to_chaos(found)
-        result["routes"] = [one.as_dict() for one in routes]
+        result["routes"] = plain(routes)
         lines += _at_most([one.line for one in routes])
     if out:
         write_table(_columns(found), out)
@@ -117,6 +143,17 @@ def _axis(machine: Any, text: str) -> Any:
     field = continuous_field(machine, name)
     units = {field: about.unit for field, about in parameters_of(machine).items()}
     return Axis.parse(f"{field}={span}" if span else text, units)
+
+
+def _points(machine: Any, axes: list[Any]) -> list[Any]:
+    """The machine at a few points of the range, by which its one model is chosen."""
+    from itertools import product
+
+    from chaosgym.machines.parameters import with_settings
+
+    count = SAMPLED if len(axes) == 1 else SAMPLED_EACH
+    values = [np.linspace(axis.low, axis.high, count).tolist() for axis in axes]
+    return [with_settings(machine, {a.field: v for a, v in zip(axes, at, strict=True)}) for at in product(*values)]
 
 
 def _map_lines(found: Any) -> list[str]:
@@ -170,20 +207,45 @@ def _lines(diagram: Any) -> list[str]:
 
 
 def _share_lines(diagram: Any, unit: str) -> list[str]:
-    """Where several motions live side by side, and their largest shares of the random starts."""
-    largest: dict[int | None, list[float]] = {}
-    several = [point for point in diagram.sweep if len(point.motions) > 1]
-    for point in several:
-        for one in point.motions:
-            largest.setdefault(one.branch, []).append(one.share)
-    if not several:
+    """How far was looked for motions, where several live side by side, and the share of each of the random starts."""
+    points = [point for point in diagram.sweep if point.motions]
+    if not points:
         return []
-    told = ", ".join(
-        f"{'no branch' if number is None else f'branch {number}'} up to {max(shares):.0%}"
-        for number, shares in sorted(largest.items(), key=lambda pair: (pair[0] is None, pair[0]))
+    unseen = max(point.unseen for point in points)
+    looked = (
+        f"{points[0].starts} random starts at each of {len(points)} values: motions not met take at most {unseen:.1%} "
+        "of such starts (95 %)"
     )
-    places = f"{several[0].value:.6g} to {several[-1].value:.6g} {unit}"
-    return [f"several motions at {len(several)} of {len(diagram.sweep)} values, {places}; of random starts: {told}"]
+    several = [point for point in points if len(point.motions) > 1]
+    if not several:
+        return [f"{looked}; one motion was met at each"]
+    ends = " to ".join(dict.fromkeys(f"{point.value:.6g}" for point in (several[0], several[-1])))
+    lines = [f"{looked}; several motions at {len(several)}, {ends} {unit}:"]
+    return [
+        *lines,
+        *_at_most([f"  {_share_line(several, diagram.branches, place, unit)}" for place in diagram.places(several)]),
+    ]
+
+
+def _share_line(several: list[Any], branches: Any, place: tuple[int | None, int | None], unit: str) -> str:
+    """A motion that lives beside others, its force, and where it takes most and fewest of the starts."""
+    there = [(point.value, one) for point in several for one in point.motions if one.place == place]
+    force = max(one.largest_peak for _, one in there)
+    told = f"up to {force:.3g} N" if force > 0.0 else "without contact"
+    number, stretch = place
+    if number is None:
+        named = f"{', '.join(sorted({one.nature for _, one in there}))}, on no branch"
+    elif stretch is None:
+        named = f"branch {number}"
+    else:
+        values = branches[number - 1].stretches[stretch - 1].values
+        named = f"branch {number}, stable from {values.min():.6g} to {values.max():.6g} {unit}"
+    shares: dict[float, float] = {}
+    for value, one in there:
+        shares[value] = shares.get(value, 0.0) + one.share
+    most, least = max(shares, key=lambda value: shares[value]), min(shares, key=lambda value: shares[value])
+    span = dict.fromkeys(f"{shares[value]:.0%} at {value:.6g} {unit}" for value in (most, least))
+    return f"{named}, {told}: {' to '.join(span)}"
 
 
 def _at_most(lines: list[str]) -> list[str]:

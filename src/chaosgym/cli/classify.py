@@ -14,7 +14,8 @@ from chaosgym.cli.options import FloatRange, recording_options
 from chaosgym.cli.output import AS_JSON, emit, patience, picture_path, plot_option
 
 if TYPE_CHECKING:
-    from chaosgym.recordings.runs import RecordingOptions, Run
+    from chaosgym.recordings.kind import RecordingOptions
+    from chaosgym.recordings.runs import Run
 
 OTHER_FILES = ("--model", "--batch", "--out", "--plot")
 """Options whose word may be the name of a file that is no record."""
@@ -25,7 +26,8 @@ def _quick_start(arguments: list[str]) -> None:
     pairs = [*pairwise(arguments)]
     record = any((word == "-" or Path(word).is_file()) and before not in OTHER_FILES for before, word in pairs)
     learned = record or "--budget-us=0" in arguments or ("--budget-us", "0") in pairs
-    if learned and not ("--batch" in arguments or "numba" in sys.modules):
+    own = any(Path(word).suffix == ".toml" for word in arguments)  # reading a machine's file runs kernels
+    if learned and not (own or "--batch" in arguments or "numba" in sys.modules):
         os.environ["NUMBA_DISABLE_JIT"] = "1"
 
 
@@ -39,7 +41,7 @@ def _quick_start(arguments: list[str]) -> None:
 @click.option("--nature-only", is_flag=True, help="Don't judge the type, which needs the four neighbours.")
 @click.option("--batch", type=click.Path(exists=True, dir_okay=False), help="Judge every row of a Parquet file.")
 @click.option("--out", type=click.Path(dir_okay=False), help="Parquet file for the answers of --batch.")
-@recording_options()
+@recording_options(("sensor-error",))
 @click.option(
     "--model", type=click.Path(exists=True, dir_okay=False), help="Classifier file; default: the shipped one."
 )
@@ -61,7 +63,7 @@ def classify(
     With FILE, what was recorded of the machine: the verdict of all tests, and what the classifier has learned beside.
     """
     from chaosgym.classifier import MachineClassifier, classifier_for
-    from chaosgym.recordings.runs import RecordingOptions
+    from chaosgym.recordings.kind import RecordingOptions
 
     if bool(batch) != bool(out):
         raise click.UsageError("--batch FILE and --out FILE belong together: give both or neither")
@@ -88,7 +90,7 @@ def _machine_lines(name: str, answer: Any) -> list[str]:
         head = f"{name}: no answer: {centre.reason}"
     else:
         period = f", period {centre.period}" if centre.period else ""
-        kind = f"Type {answer.response_type}, " if answer.response_type else ""
+        kind = f"Type {answer.response_type} from {answer.begun}, " if answer.response_type else ""
         proven = "proven" if centre.proven else f"probability {centre.probability:.3f}"
         head = f"{name}: {kind}{centre.nature}{period}; {proven} by {centre.stage} ({centre.cycles} cycles simulated)"
     lines = [
@@ -97,6 +99,7 @@ def _machine_lines(name: str, answer: Any) -> list[str]:
     ]
     if answer.type_reason:
         lines.append(f"  type: {answer.type_reason}{'; every nature proven' if answer.type_proven else ''}")
+        lines.append(f"  {answer.searched}")
     if centre.largest_peak is not None:
         lines.append(f"  largest peak force {centre.largest_peak:.1f} N")
     return [*lines, f"  {answer.microseconds / 1e3:.2f} ms, the nature {centre.microseconds / 1e3:.2f} ms"]

@@ -7,7 +7,16 @@ import click
 
 from chaosgym.cli.machine_options import machine_command
 from chaosgym.cli.options import FORCE_ERROR, FloatRange
-from chaosgym.cli.output import emit, force_line, patience, picture_path, plot_option, verdict_lines
+from chaosgym.cli.output import (
+    DIAGNOSED,
+    announce,
+    emit,
+    force_line,
+    patience,
+    picture_path,
+    plot_option,
+    verdict_lines,
+)
 
 if TYPE_CHECKING:
     from chaosgym.branches.margins import Margins
@@ -19,7 +28,7 @@ Part = tuple[dict[str, Any], list[str]]
 """Values for JSON, and lines for people."""
 
 
-@machine_command
+@machine_command(chooses="point")
 @click.option(
     "--test",
     type=click.Choice(["adaptive", "two-step", "mut"]),
@@ -59,17 +68,21 @@ def diagnose(
     error = sensor_error or 0.0
     if (types or margins or kicks) and test != "adaptive":
         raise click.UsageError(f"--types, --margins and --kicks go with --test adaptive, not with {test}")
+    if test != "mut":
+        announce("diagnose", machine, DIAGNOSED * budget)
     with patience("diagnose"):
         verdict = _verdict(machine, test, budget, error)
         response = _response(machine, verdict, budget, error) if types else None
-        verdict, motions = _with_other_motions(machine, verdict, response, looked=margins or bool(kicks))
+        verdict, motions = _with_other_motions(machine, verdict, response, budget if margins or kicks else 0)
         parts = [_settled_part(machine, verdict, test)]
         if types or margins or kicks:
             parts.append(({"attractors": None if motions is None else motions.as_dict()}, []))
         if response is not None:
             parts.append(_type_part(response))
         if margins or kicks:
-            parts.append(_margin_part(machine, verdict, motions, reach, kicks or 0))
+            parts.append(_margin_part(machine, verdict, reach))
+        if motions is not None:
+            parts.append(_beside_part(machine, verdict, motions, kicks or 0))
     result = {name: value for values, _ in parts for name, value in values.items()}
     emit(
         result,
@@ -109,7 +122,7 @@ def _settled_part(machine: Any, verdict: "MachineDiagnosis", test: str) -> Part:
     exponent = verdict.evidence["largest_lyapunov_exponent_per_cycle"]
     signs = signs_of_chaos(verdict)
     no_contact = [] if verdict.judged.peak_force.any() else ["no contact at all: the gap is never closed"]
-    doubts = [verdict.reason] if verdict.status in ("disputed", "transient", "unresolved") else []
+    doubts = [verdict.reason] if verdict.status in ("disputed", "unresolved") else []
     cycles = verdict.evidence["cycles_used"]
     result |= {
         "largest_lyapunov_exponent_per_cycle": {key: exponent[key] for key in ("value", "standard_error")},
@@ -156,43 +169,50 @@ def _response(machine: Any, verdict: "MachineDiagnosis", budget: int, sensor_err
 
 
 def _with_other_motions(
-    machine: Any, verdict: "MachineDiagnosis", response: "ResponseType | None", looked: bool
+    machine: Any, verdict: "MachineDiagnosis", response: "ResponseType | None", budget: int
 ) -> "tuple[MachineDiagnosis, Attractors | None]":
-    """The verdict with the other motions of the machine, where its type or its margins ask for them."""
+    """The verdict with the other motions of the machine, where its type or its margins ask for them.
+
+    ``budget`` are cycles of a search for margins; 0 for none.
+    """
     if response is not None:
         return response.centre, response.attractors
-    if not looked or verdict.nature != "periodic":
+    if not budget or verdict.nature != "periodic":
         return verdict, None
     from chaosgym.diagnosis import attractors
     from chaosgym.diagnosis.carried import carried_states
 
-    motions = attractors(machine, centre=verdict, carried=carried_states(machine))
+    motions = attractors(machine, budget=budget, centre=verdict, carried=carried_states(machine))
     return motions.told_of(verdict), motions
 
 
 def _type_part(response: "ResponseType") -> Part:
     values = {"response_type": response.type, "response_type_reason": response.reason}
-    return values, [f"  Type {response.type}: {response.reason}"]
+    return values, [f"  Type {response.type}: {response.reason}", f"    means: {response.meaning}"]
 
 
-def _margin_part(
-    machine: Any, verdict: "MachineDiagnosis", motions: "Attractors | None", reach: float, knocks: int
-) -> Part:
-    """The margins of a certified orbit and what lives beside it, or why there are none."""
-    from chaosgym.branches.coexistence import coexistence
+def _margin_part(machine: Any, verdict: "MachineDiagnosis", reach: float) -> Part:
+    """The margins of a certified orbit, or why there are none."""
     from chaosgym.branches.margins import margins_of
 
     margins = margins_of(machine, verdict, reach=reach)
     if margins is None:
-        why = f"no margins: they need a periodic response that is proven, this one is {verdict.words}"
+        why = f"no margins: they need an orbit that is proven to attract, this response is {verdict.words}"
         return {"margins": None}, [f"  {why}"]
-    beside = coexistence(machine, verdict, motions, knocks=knocks)
     lines = [
         f"largest multiplier {margins.largest_multiplier:.3g}; stability ends, in tolerances:",
         *(f"  {line}" for line in _margin_lines(machine, margins, reach)),
-        *beside.lines,
     ]
-    return {"margins": margins.as_dict(), "coexistence": beside.as_dict()}, [f"  {line}" for line in lines]
+    return {"margins": margins.as_dict()}, [f"  {line}" for line in lines]
+
+
+def _beside_part(machine: Any, verdict: "MachineDiagnosis", motions: "Attractors", knocks: int) -> Part:
+    """Where each of several motions is stable along the speed, and the smallest knock that leaves a proven one."""
+    from chaosgym.branches.coexistence import coexistence
+
+    proven = verdict.orbit is not None and verdict.orbit.certified
+    beside = coexistence(machine, verdict, motions, knocks=knocks if proven else 0)
+    return {"coexistence": beside.as_dict()}, [f"  {line}" for line in beside.lines]
 
 
 def _margin_lines(machine: Any, margins: "Margins", reach: float) -> Iterable[str]:

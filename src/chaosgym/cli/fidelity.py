@@ -8,7 +8,7 @@ import click
 
 from chaosgym.cli.machine_options import machine_command
 from chaosgym.cli.options import FloatRange
-from chaosgym.cli.output import WORKERS, emit, patience, verdict_lines
+from chaosgym.cli.output import WORKERS, announce, emit, patience, seconds_of, verdict_lines
 
 if TYPE_CHECKING:
     from chaosgym.fidelity.tradeoff import Tradeoff, TradeoffRow
@@ -42,10 +42,19 @@ def tradeoff(
     as_json: bool,
 ) -> None:
     """Measure every rung of a machine, and fixed steps, against its reference: cost, errors, Pareto front."""
+    from chaosgym.fidelity.tradeoff import settings_of
     from chaosgym.fidelity.tradeoff import tradeoff as measure
+    from chaosgym.machines.parameters import with_settings
 
     if step_check:
         return _step_check(machine, as_json)
+    settings = settings_of(machine)
+    exact = sum(
+        seconds_of(with_settings(machine, {"fidelity": one.rung}), points * (transient + cycles))
+        for one in settings
+        if one.method == "exact"
+    )
+    announce("tradeoff", machine, 0, besides=exact + budget * sum(one.method != "exact" for one in settings))
     result = measure(
         machine, points=points, cycles=cycles, transient=transient, budget=budget, workers=workers, progress=True
     )

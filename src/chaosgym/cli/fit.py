@@ -8,11 +8,11 @@ import click
 from chaosgym.cli.judge import run_lines
 from chaosgym.cli.machine_options import machine_command
 from chaosgym.cli.options import FILE, recording_options
-from chaosgym.cli.output import emit, patience, picture_path, plot_option
+from chaosgym.cli.output import DIAGNOSED, announce, emit, patience, picture_path, plot_option
 
 if TYPE_CHECKING:
     from chaosgym.fit.record_fit import RecordFit
-    from chaosgym.recordings.runs import RecordingOptions
+    from chaosgym.recordings.kind import RecordingOptions
 
 
 @machine_command
@@ -31,18 +31,23 @@ def fit(
     as_json: bool,
 ) -> None:
     """Tell what a machine's model says of a recording: its nature, and parameters of the machine."""
+    from chaosgym.fit.model_fit import usual_cycles
     from chaosgym.fit.record_fit import fit_record
 
     picture = picture_path(plot, f"fit-{machine.name}")
+
+    def begin() -> None:
+        announce("fit", machine, DIAGNOSED * usual_cycles(machine, estimate))
+
     with patience("compare with the machine"):
-        result = fit_record(machine, file, options, estimate=estimate)
+        result = fit_record(machine, file, options, estimate=estimate, begin=begin)
     first = result.runs[0]
     emit(
         result.as_dict(),
         as_json,
         lambda: _fit_lines(result),
         picture,
-        lambda plots: plots.measured_figure(first.peaks, first.verdict.diagnosis, first.title, first.unit),
+        lambda plots: plots.measured_figure(first),
     )
 
 
@@ -59,7 +64,7 @@ def _fit_lines(result: "RecordFit") -> list[str]:
     return [*lines, *(line for run in runs for line in run_lines(f"{run.name} without the model", run))]
 
 
-@machine_command
+@machine_command(chooses="point")
 @FILE
 @recording_options()
 @click.option(

@@ -3,6 +3,7 @@
 Delete this file, its call in ``chaosgym.cli`` and its section in the list of commands with that version.
 """
 
+import re
 import shlex
 from typing import NamedTuple
 
@@ -23,6 +24,22 @@ OPTIONS = (
 )
 """Options of every command below. A number that has its unit keeps it."""
 
+KEYED = {
+    "sweep": ("--label", "full-types initial-states definition signals"),
+    "judge": ("--read", "unit scale sheet tachometer pulses-per-revolution sensor-sigma"),
+    "fit": ("--read", "unit scale sheet tachometer pulses-per-revolution sensor-sigma"),
+    "overlay": ("--read", "unit scale sheet tachometer pulses-per-revolution sensor-sigma"),
+    "classify": ("--read", "column unit scale sheet as rate-hz cycle tachometer pulses-per-revolution sensor-sigma"),
+    "design": (
+        "--read",
+        "column unit scale sheet as rate-hz cycle tachometer pulses-per-revolution sensor-error sensor-sigma",
+    ),
+    "judge-sweep": ("--read", "unit scale sheet sensor-sigma"),
+    "run-up": ("--read", "unit scale sheet sensor-sigma"),
+    "monitor": ("--read", "unit scale sensor-sigma"),
+}
+"""Options that one of KEY=VALUE took the place of, by command."""
+
 COMMANDS = (
     Spelling("diagnose --sweep FILE", "judge-sweep FILE"),
     Spelling("diagnose --series FILE --run-up", "run-up FILE"),
@@ -34,17 +51,32 @@ COMMANDS = (
     Spelling("overlay MACHINE --peaks FILE", "overlay MACHINE FILE --as peaks"),
     Spelling("overlay MACHINE --series FILE", "overlay MACHINE FILE --as series"),
     Spelling("classify MACHINE --follow", "monitor"),
-    Spelling("classify MACHINE --peaks FILE", "classify MACHINE FILE --as peaks"),
-    Spelling("classify MACHINE --series FILE", "classify MACHINE FILE --as series"),
-    Spelling("design --beside --peaks FILE", "design --beside FILE --as peaks"),
-    Spelling("design --beside --series FILE", "design --beside FILE --as series"),
-    Spelling("design BRIEF --peaks FILE", "design BRIEF --beside FILE --as peaks"),
-    Spelling("design BRIEF --series FILE", "design BRIEF --beside FILE --as series"),
+    Spelling("classify MACHINE --peaks FILE", "classify MACHINE FILE --read as=peaks"),
+    Spelling("classify MACHINE --series FILE", "classify MACHINE FILE --read as=series"),
+    Spelling("design --beside --peaks FILE", "design --beside FILE --read as=peaks"),
+    Spelling("design --beside --series FILE", "design --beside FILE --read as=series"),
+    Spelling("design BRIEF --peaks FILE", "design BRIEF --beside FILE --read as=peaks"),
+    Spelling("design BRIEF --series FILE", "design BRIEF --beside FILE --read as=series"),
+    Spelling("design --peaks FILE --out REPORT", "judge FILE --as peaks --report REPORT"),
+    Spelling("design --series FILE --out REPORT", "judge FILE --as series --report REPORT"),
     Spelling("design --peaks FILE", "judge FILE --as peaks"),
     Spelling("design --series FILE", "judge FILE --as series"),
+    Spelling("judge --out REPORT", "judge --report REPORT"),
+    Spelling("sweep --random NUMBER --seed SEED", "sweep --sampling random:NUMBER:SEED"),
+    Spelling("sweep --sobol NUMBER --seed SEED", "sweep --sampling sobol:NUMBER:SEED"),
+    Spelling("sweep --crosses NUMBER --seed SEED", "sweep --sampling crosses:NUMBER:SEED"),
+    Spelling("sweep --random NUMBER", "sweep --sampling random:NUMBER"),
+    Spelling("sweep --sobol NUMBER", "sweep --sampling sobol:NUMBER"),
+    Spelling("sweep --crosses NUMBER", "sweep --sampling crosses:NUMBER"),
+    Spelling("sweep --grid", "sweep --sampling grid"),
+    Spelling("sweep --seed SEED", "sweep"),
+    Spelling("sweep --scheduler ADDRESS", "sweep --workers ADDRESS"),
+    Spelling("sweep --routes", "sweep --label routes=yes"),
 )
-"""Commands; the first that fits counts, and what it does not name stays as it is."""
+"""Commands, each that fits in this order; what they do not name stays as it is."""
 
+PLACEHOLDER = re.compile("[A-Z]+")
+"""Word of a spelling that stands for one of the command line."""
 
 NAMED = {"MACHINE", "BRIEF"}
 """Words that stand for the machine, or the file, that a command line names."""
@@ -59,12 +91,17 @@ def rewritten(arguments: list[str]) -> list[str]:
     >>> rewritten(["judge", "peaks.csv"])
     ['judge', 'peaks.csv']
     """
-    row = next((row for row in COMMANDS if _fits(row, arguments)), None)
-    if row is None:
+    current = arguments
+    for row in COMMANDS:
+        current = _command(row, current) if _fits(row, current) else current
+    for row in OPTIONS if current != arguments else ():
+        current = _option(row, current)
+    option, keys = KEYED.get(current[0], ("", "")) if current else ("", "")
+    for key in keys.split():
+        value, rest = _without(f"--{key}", True, current)
+        current = current if rest == current else [*rest, option, f"{key}={value}"]
+    if current == arguments:
         return arguments
-    current = _command(row, arguments)
-    for option in OPTIONS:
-        current = _option(option, current)
     click.echo(f"note: a former spelling, which the next version does not know; write: {_shown(current)}", err=True)
     return current
 
@@ -103,7 +140,7 @@ def _command(row: Spelling, arguments: list[str]) -> list[str]:
     for option, word in _options(former).items():
         value, rest = _without(option, word is not None, rest)
         words |= {} if word is None else {word: value}
-    return [words.get(word, word) for word in row.current.split()] + rest
+    return [PLACEHOLDER.sub(lambda found: words.get(found[0], found[0]), word) for word in row.current.split()] + rest
 
 
 def _without(option: str, valued: bool, arguments: list[str]) -> tuple[str, list[str]]:

@@ -14,7 +14,7 @@ def info(as_json: bool) -> None:
     import platform
     from importlib import metadata
 
-    from chaosgym.core.kernel_cache import KERNEL_CACHE
+    from chaosgym.core.kernel_cache import KERNEL_CACHE, ROOT
 
     packages: dict[str, str | None] = {}
     for package in ("numpy", "scipy", "numba", "gymnasium", "pyarrow", "matplotlib", "torch", "stable-baselines3"):
@@ -37,6 +37,6 @@ def info(as_json: bool) -> None:
             f"chaosgym {__version__} on Python {result['python']}, {result['platform']}",
             "machines: " + ", ".join(MACHINES),
             *(f"{package:18s} {version or 'not installed'}" for package, version in packages.items()),
-            f"kernel cache: {KERNEL_CACHE}",
+            f"kernel cache: {ROOT}",
         ],
     )

@@ -1,7 +1,7 @@
 """Verdicts on recordings: ``judge`` a file, ``judge-sweep`` one of many speeds, ``run-up`` one of changing speed."""
 
 import datetime
-from collections.abc import Iterable
+from collections.abc import Callable, Iterable
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -20,8 +20,13 @@ from chaosgym.cli.output import (
 )
 
 if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
+    from chaosgym.design.bearing import Criteria
+    from chaosgym.design.measured import MeasuredPeaks
+    from chaosgym.recordings.kind import RecordingOptions
     from chaosgym.recordings.measured_verdict import MeasuredVerdict
-    from chaosgym.recordings.runs import JudgedFile, RecordingOptions, Run
+    from chaosgym.recordings.runs import JudgedFile, Run
     from chaosgym.recordings.swept_files import JudgedRunUp, JudgedSweep
 
 
@@ -29,7 +34,7 @@ if TYPE_CHECKING:
 @FILE
 @recording_options()
 @click.option("--load-rating", type=Quantity("N"), help="Load rating of the surface: tell the life of its bearing too.")
-@click.option("--out", type=click.Path(dir_okay=False), help="HTML report on the forces, with a JSON file beside it.")
+@click.option("--report", type=click.Path(dir_okay=False), help="Report to write (.html or .pdf), and JSON beside it.")
 @click.option("--overwrite", is_flag=True, help="Replace the report if it exists.")
 @plot_option()
 @AS_JSON
@@ -37,7 +42,7 @@ def judge(
     file: str,
     options: "RecordingOptions",
     load_rating: float | None,
-    out: str | None,
+    report: str | None,
     overwrite: bool,
     plot: str | None,
     as_json: bool,
@@ -47,74 +52,86 @@ def judge(
     FILE holds one reading a cycle or a series over time: CSV, Parquet, .npy, .mat, WAV and recorders' own formats. It
     may be -, a folder, or a pattern of files.
     """
-    from chaosgym.recordings.runs import judged_files, table_as_dict
+    from chaosgym.recordings.runs import JudgedFile, judged_files, judged_run
 
     picture = picture_path(plot, "judge")
-    if load_rating is not None or out is not None:
-        return _evaluated(file, options, load_rating, out, overwrite, picture, as_json)
+    if report is not None:
+        from chaosgym.plotting.design_report import report_paths
+
+        report_paths(report, overwrite)
+    criteria = None if load_rating is None else _criteria(load_rating)
     with patience("read and judge the recording"):
-        files = judged_files(file, options, progress=True)
-    runs = [run for one in files for run in one.runs]
-    if len(files) == len(runs) == 1:
-        (run,) = runs
-        return emit(
-            run.as_dict(),
-            as_json,
-            lambda: run_lines(run.source, run),
-            picture,
-            lambda plots: plots.measured_figure(run.peaks, run.verdict.diagnosis, run.title, run.unit),
-        )
-    shown = [(run.title, run.peaks, run.verdict.diagnosis) for run in runs]
-    return emit(
-        table_as_dict(files), as_json, lambda: table_lines(files), picture, lambda plots: plots.thumbnails(shown)
-    )
+        if criteria is None:
+            files = judged_files(file, options, progress=True, traced=report is not None)
+        else:
+            run = judged_run(file, options, traced=report is not None)
+            files = (JudgedFile(run.source, (run,)),)
+    life = None if criteria is None else _life(files[0].runs[0], criteria)
+    result, lines, draw = _answer(files, life)
+    if report is not None:
+        _write(report, files, life, result, overwrite)
+        lines = [*lines, f"report: {report}"]
+    emit(result, as_json, lambda: lines, picture, draw)
 
 
-def _evaluated(
-    file: str,
-    options: "RecordingOptions",
-    load_rating: float | None,
-    out: str | None,
-    overwrite: bool,
-    picture: Path | None,
-    as_json: bool,
-) -> None:
-    """Tell what the recorded forces mean for a bearing surface, its life if it is rated, and write the report."""
+def _criteria(load_rating: float) -> "Criteria":
+    """What a bearing surface of a load rating [N] is judged by."""
     from chaosgym.design.bearing import Criteria
-    from chaosgym.design.measured import evaluate_run
-    from chaosgym.plotting import design_report as report
-    from chaosgym.recordings.runs import judged_run
 
-    if out is not None:
-        report.report_paths(out, overwrite)
-    stated = {} if load_rating is None else {"load_rating": "--load-rating"}
-    criteria = Criteria(load_rating=load_rating, stated=stated)
-    with patience("read and judge the recording"):
-        run = judged_run(file, options)
-    evaluation = evaluate_run(run, criteria, date=datetime.date.today().isoformat())
-    written = []
-    if out is not None:
-        report.write_report(report.measured_report(evaluation), evaluation.as_dict(), out, overwrite)
-        written.append(f"report: {out}")
-    emit(
-        evaluation.as_dict(),
-        as_json,
-        lambda: [*evaluation.lines(), *run.notes, *written],
-        picture,
-        lambda plots: plots.peaks_figure(evaluation),
-    )
+    return Criteria(load_rating=load_rating, stated={"load_rating": "--load-rating"})
+
+
+def _life(run: "Run", criteria: "Criteria") -> "MeasuredPeaks":
+    """What recorded forces mean for a bearing surface."""
+    from chaosgym.design.measured import evaluate_run
+
+    return evaluate_run(run, criteria, date=datetime.date.today().isoformat())
+
+
+def _answer(
+    files: "tuple[JudgedFile, ...]", life: "MeasuredPeaks | None"
+) -> "tuple[dict[str, Any], list[str], Callable[[Any], Figure]]":
+    """Result, lines for people and picture: of a life, of one column, or of several."""
+    from chaosgym.recordings.runs import table_as_dict
+
+    runs = [run for one in files for run in one.runs]
+    if life is not None:
+        lines = [*life.lines(), *runs[0].notes]
+        return life.as_dict(), lines, lambda plots: plots.peaks_figure(life)
+    if len(files) == len(runs) == 1 and not files[0].error:
+        (run,) = runs
+        return run.as_dict(), run_lines(run.source, run), lambda plots: plots.measured_figure(run)
+    shown = [(run.title, run.peaks, run.verdict.diagnosis) for run in runs]
+    return table_as_dict(files), table_lines(files), lambda plots: plots.thumbnails(shown)
+
+
+def _write(
+    report: str,
+    files: "tuple[JudgedFile, ...]",
+    life: "MeasuredPeaks | None",
+    result: dict[str, Any],
+    overwrite: bool,
+) -> None:
+    from chaosgym.plotting.design_report import write_report
+    from chaosgym.plotting.recording_report import recording_report
+
+    page = recording_report(files, life, date=datetime.date.today().isoformat())
+    write_report(page, result, report, overwrite)
 
 
 @click.command("judge-sweep")
 @FILE
 @click.option("--speed-column", metavar="NAME", help="Column of the speed, where there are several.")
-@recording_options(OF_SWEEP)
+@recording_options(("column", "sensor-error"), OF_SWEEP)
 @plot_option()
 @AS_JSON
 def judge_sweep(
     file: str, speed_column: str | None, options: "RecordingOptions", plot: str | None, as_json: bool
 ) -> None:
-    """Tell the types (I, II, III) of a measured sweep: peak forces at many speeds, a line a cycle with its speed."""
+    """Tell the types (I, II, III) of a measured sweep: peak forces at many speeds, a line a cycle with its speed.
+
+    FILE may be a folder, or a pattern of files, such as one a speed.
+    """
     from chaosgym.recordings.swept_files import judged_sweep
 
     picture = picture_path(plot, "judge-sweep")
@@ -139,7 +156,7 @@ def _sweep_lines(sweep: "JudgedSweep") -> list[str]:
 @click.command("run-up")
 @FILE
 @click.option("--orders", type=FloatRange(1.0, 1000.0), metavar="NUMBER", help="Highest order; default 20.")
-@recording_options(OF_RUN_UP)
+@recording_options(("column", "rate-hz", "tachometer", "pulses-per-revolution", "sensor-error"), OF_RUN_UP)
 @plot_option()
 @AS_JSON
 def run_up(file: str, orders: float | None, options: "RecordingOptions", plot: str | None, as_json: bool) -> None:
@@ -172,8 +189,15 @@ def _run_up_lines(judged: "JudgedRunUp") -> list[str]:
     if result.envelope:
         named = ", ".join(f"{round(line.order, 2):g}" for line in result.envelope)
         lines.append(f"  envelope of the ringing above: orders {named}, the strongest first")
+    lines += [_fixed_line(line, unit) for line in result.fixed]
     lines += [] if result.types is None else region_lines(result.types, "rpm", unit)
     return [*lines, *(f"  {note}" for note in judged.notes)]
+
+
+def _fixed_line(line: Any, unit: str) -> str:
+    """A frequency that does not follow the speed."""
+    told = "a line" if line.damping is None else f"a resonance, damping {100.0 * line.damping:.2g} %,"
+    return f"  {line.frequency:.4g} Hz: {told} of {line.amplitude:.3g} {unit} at all speeds, no order"
 
 
 def _order_line(line: Any, unit: str) -> str:
@@ -218,6 +242,10 @@ def _row(name: str, channel: str, verdict: "MeasuredVerdict", cycles: int) -> tu
     return name, channel, verdict.diagnosis.words, scatter, str(cycles)
 
 
+MOST_UNTOLD = 2
+"""Beginnings of irregular motion without a route that have a line each."""
+
+
 def region_lines(types: Any, speed_unit: str, unit: str) -> list[str]:
     """Regions of types, upwards, and where irregular motion begins."""
     after, rows = f" {speed_unit}" if speed_unit else "", []
@@ -228,7 +256,14 @@ def region_lines(types: Any, speed_unit: str, unit: str) -> list[str]:
         natures = f"irregular at {wild} of {len(inside)} speeds" if wild else "periodic"
         forces = f"mean peak {region.lowest_mean:.4g} to {region.highest_mean:.4g} {unit}"
         rows.append(f"  Type {region.type:4s} {span:18s} {natures}, {forces}")
+    untold = [one for one in types.beginnings if one.route == "not told"]
     for one in types.beginnings:
-        route = "route not told" if one.route == "not told" else one.route
-        rows.append(f"  irregular between {one.periodic:.6g} and {one.irregular:.6g}{after}: {route}; {one.because}")
+        if one not in untold or len(untold) <= MOST_UNTOLD:
+            route = "route not told" if one.route == "not told" else one.route
+            rows.append(
+                f"  irregular between {one.periodic:.6g} and {one.irregular:.6g}{after}: {route}; {one.because}"
+            )
+    if len(untold) > MOST_UNTOLD:
+        places = ", ".join(f"{speed:.6g}" for speed in sorted({one.irregular for one in untold}))
+        rows.append(f"  becomes irregular at {places}{after}, by no route that is told")
     return rows

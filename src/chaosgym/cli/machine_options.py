@@ -7,6 +7,7 @@ a unit, as in ``0.127 mm``; bare ones are in the option's.
 
 import functools
 from collections.abc import Callable, Iterable, Mapping
+from difflib import get_close_matches
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -14,15 +15,25 @@ import click
 from click.shell_completion import CompletionItem
 
 from chaosgym.cli.options import Quantity
-from chaosgym.cli.output import AS_JSON, note_machine
+from chaosgym.cli.output import AS_JSON, note_machine, note_model
 from chaosgym.errors import ParameterError
 from chaosgym.machines import FILE_ENDING, MACHINES
 
 if TYPE_CHECKING:
     from chaosgym.machines.machine import Number, Option
 
+ASKED = "chaosgym.tolerance"
+"""Where a command keeps the tolerance that its model is chosen for; None for a model that is stated."""
+
 START_CYCLES = 32
 """Cycles from rest by which the box of random initial states is scaled."""
+
+
+INITIAL_STATE = click.option(
+    "--initial-state",
+    metavar="FILE|rest|random:SEED",
+    help="State from which it runs: a file of its numbers in SI units, or JSON; rest if left out.",
+)
 
 
 def millimetres_meant(field: str, written: str, value: float, usual: float) -> str:
@@ -54,8 +65,11 @@ class MachineName(click.ParamType):  # type: ignore[type-arg]
     def convert(self, value: Any, param: click.Parameter | None, ctx: click.Context | None) -> str:
         """Return the name, or say which there are."""
         if value not in MACHINES:
+            near = get_close_matches(value, MACHINES, 1)
+            hint = f"; did you mean {near[0]}?" if near else "."
+            hint = f"; a recording is judged by: chaosgym judge {value}" if Path(value).is_file() else hint
             names = ", ".join(repr(name) for name in sorted(MACHINES))
-            self.fail(f"{value!r} is not one of {names}, nor a file that ends in {FILE_ENDING}.", param, ctx)
+            self.fail(f"{value!r} is not one of {names}, nor a file that ends in {FILE_ENDING}{hint}", param, ctx)
         return str(value)
 
 
@@ -125,37 +139,49 @@ def machine_command(
     *,
     required: bool = True,
     before: Callable[[list[str]], None] | None = None,
+    chooses: str = "",
 ) -> Any:
     """Make a command with the MACHINE argument, the options of that machine, ``--set``, ``--fidelity`` and ``--json``.
 
     The function receives ``machine`` (constructed, or None if it is not required and not given) and ``as_json``.
+    Where it ``chooses`` a model, at the machine's "point" or by ``model_over`` itself over a "range", the answer names
+    the model, which is within ``DEFAULT_TOLERANCE`` if none is stated.
     """
     if function is None:
-        return functools.partial(machine_command, required=required, before=before)
+        return functools.partial(machine_command, required=required, before=before, chooses=chooses)
     own = {parameter.name for parameter in getattr(function, "__click_params__", [])} | {"as_json"}
 
     @functools.wraps(function)
     def wrapped(
-        machine: str | None, settings: tuple[str, ...], fidelity: str | None, initial_state: str | None, **others: Any
+        machine: str | None,
+        settings: tuple[str, ...],
+        fidelity: str | None,
+        initial_state: str | None = None,
+        **others: Any,
     ) -> None:
         given = {f"--{name.replace('_', '-')}": others.pop(name) for name in set(others) - own}
         given = {name: value for name, value in given.items() if value is not None}
         if machine is None and (settings or given or fidelity or initial_state):
             raise click.UsageError(f"these options need a machine: {', '.join(MACHINES)}")
-        built = machine and build_machine(machine, given, settings, fidelity)
+        built, stated = build_machine(machine, given, settings, fidelity) if machine else (None, False)
+        if built and (chooses or fidelity is not None):
+            from chaosgym.machines.accuracy import DEFAULT_TOLERANCE
+
+            # a state belongs to one model
+            stated = stated or bool(built.initial_state) or initial_state not in (None, "rest", *_random(initial_state))
+            click.get_current_context().meta[ASKED] = None if stated else fidelity or DEFAULT_TOLERANCE
+            built = built if chooses == "range" else model_over(built)
         if built and initial_state:
-            built = built.from_state(_initial_state(built, initial_state))
+            built = built.from_state(stated_state(built, initial_state))
         if built:
             note_machine(built)
         function(machine=built, **others)
 
+    wrapped = INITIAL_STATE(wrapped)
     wrapped = click.option(
-        "--initial-state",
-        metavar="FILE|rest|random:SEED",
-        help="State from which it runs: a file of its numbers in SI units, or JSON; rest if left out.",
-    )(wrapped)
-    wrapped = click.option(
-        "--fidelity", metavar="RUNG", help="Rung of the machine's ladder of models, such as fine or reference."
+        "--fidelity",
+        metavar="ERROR|RUNG",
+        help="Error of the peak force that is allowed ('1 %'), or a rung of the ladder of models, such as fine.",
     )(wrapped)
     wrapped = click.option(
         "--set",
@@ -169,7 +195,26 @@ def machine_command(
     return click.command(cls=MachineCommand, before=before)(wrapped)
 
 
-def _initial_state(machine: Any, text: str) -> Any:
+def model_over(machine: Any, points: Iterable[Any] = (), *, chosen: Iterable[str] = ()) -> Any:
+    """The machine by the model that the command line asks for, at all of some operating points; the answer names it.
+
+    A model of which a field is ``chosen`` otherwise, such as by an axis, stays as it is.
+    """
+    from chaosgym.machines import accuracy
+
+    asked = click.get_current_context().meta.get(ASKED, accuracy.DEFAULT_TOLERANCE)
+    points, stated = tuple(points), asked is None or bool(set(chosen) & set(machine.model_fields))
+    found = accuracy.accuracy_of(machine, points) if stated else accuracy.model_within(machine, asked, points)
+    note_model(found)
+    return found.machine
+
+
+def _random(initial_state: str | None) -> tuple[str, ...]:
+    """The text itself, if it asks for a random start, which any model has."""
+    return (initial_state,) if initial_state is not None and initial_state.startswith("random:") else ()
+
+
+def stated_state(machine: Any, text: str) -> Any:
     """State that --initial-state names; one of the random starts of the search for other motions by its seed."""
     if text == "rest":
         return ()
@@ -192,16 +237,21 @@ def _initial_state(machine: Any, text: str) -> Any:
         ) from error
 
 
-def build_machine(name: str, given: Mapping[str, Any], settings: tuple[str, ...], fidelity: str | None = None) -> Any:
-    """Build the machine that a command line describes; what is not given is as in the thesis.
+def build_machine(
+    name: str, given: Mapping[str, Any], settings: tuple[str, ...], fidelity: str | None = None
+) -> tuple[Any, bool]:
+    """Build the machine that a command line describes, and say whether its model is stated, by a rung or a field of it.
+
+    What is not given is as in the thesis. A tolerance is checked here; it is met later.
 
     Raises
     ------
     click.UsageError
         If an option is not the machine's, or its value is not allowed; names option, value and range.
     """
+    from chaosgym.machines.accuracy import is_tolerance
     from chaosgym.machines.machine import Choice
-    from chaosgym.machines.parameters import with_settings
+    from chaosgym.machines.parameters import expand_fidelity, with_settings
 
     owner = MACHINES[name]
     known: Mapping[str, Any] = owner.options
@@ -231,10 +281,11 @@ def build_machine(name: str, given: Mapping[str, Any], settings: tuple[str, ...]
         if field in numbers:
             raise click.UsageError(f"{field} is given twice: by {numbers[field]} and by --set")
         fields[field] = value
-    machine = with_settings(owner(), fields if fidelity is None else {**fields, "fidelity": fidelity})
+    rung = fidelity is not None and not is_tolerance(fidelity)
+    machine = with_settings(owner(), expand_fidelity(owner, {**fields, "fidelity": fidelity}))
     for note in notes:
         click.echo(note, err=True)
-    return machine
+    return machine, rung or any(field in owner.model_fields for field in fields)
 
 
 def _checked(owner: Any, option: str, number: "Number", value: float) -> float:

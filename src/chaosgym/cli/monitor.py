@@ -1,34 +1,29 @@
 """The command ``monitor``: peaks from standard input, one a line, with an alarm."""
 
 import sys
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import click
 
-from chaosgym.cli.options import COLUMN, FORCE_ERROR, FORCE_SIGMA, SCALE, UNIT, Quantity
+from chaosgym.cli.options import OF_STREAM, Quantity, recording_options
 from chaosgym.cli.output import AS_JSON, emit
+
+if TYPE_CHECKING:
+    from chaosgym.recordings.kind import RecordingOptions
 
 GIVE_UP = 100
 """Lines without a reading after which the stream is taken for the wrong one."""
 
 
 @click.command()
-@COLUMN
-@UNIT
-@SCALE
+@recording_options(("column", "sensor-error"), OF_STREAM)
 @click.option("--delimiter", metavar="TEXT", help="Between the columns; default: found from each line.")
-@FORCE_ERROR
-@FORCE_SIGMA
 @click.option("--log", type=click.Path(dir_okay=False), help="CSV file to which events are appended.")
 @click.option("--timeout-s", type=Quantity("s"), help="Time without a line after which it says: stalled.")
 @AS_JSON
 def monitor(
-    column: str | None,
-    unit: str | None,
-    scale: str | None,
+    options: "RecordingOptions",
     delimiter: str | None,
-    sensor_error: float | None,
-    sensor_sigma: float | None,
     log: str | None,
     timeout_s: float | None,
     as_json: bool,
@@ -37,15 +32,18 @@ def monitor(
 
     What is no reading is counted, warned of and survived.
     """
+    from chaosgym.recordings.kind import in_readings
     from chaosgym.recordings.monitor import LONGEST, EventLog, Monitor
     from chaosgym.recordings.stream import LineReader, stalls
     from chaosgym.series.noise import stated_error
 
     if timeout_s is not None and not 0.0 < timeout_s < 1e6:
         raise click.UsageError(f"--timeout-s {timeout_s:g} is out of range; allowed: above 0")
-    error = stated_error(sensor_error, sensor_sigma)
+    if sys.stdin is None:
+        raise click.UsageError("standard input is closed; allowed: a program that writes a peak a line")
+    error = stated_error(in_readings(options.sensor_error, "N"), in_readings(options.sensor_sigma, "N"))
     watch = Monitor(None if error is None else error.half_width, longest_period=LONGEST)
-    reader = LineReader(column, delimiter, unit, scale)
+    reader = LineReader(options.column, delimiter, options.unit, options.scale)
     with EventLog(log) as events:
         for number, line in stalls(sys.stdin, timeout_s):
             if line is None:

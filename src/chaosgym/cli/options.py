@@ -1,12 +1,12 @@
 """Types of options, with units or in a range, and the options of a file of readings, the same for every command."""
 
 import functools
-from collections.abc import Callable, Iterable
-from typing import Any
+from collections.abc import Callable, Iterable, Mapping
+from typing import Any, NamedTuple
 
 import click
 
-from chaosgym.errors import ParameterError
+from chaosgym.errors import ParameterError, nearest_or
 
 BASE = {"mm": "m", "arcmin": "rad"}
 """Unit of the field behind an option, where it is another than the option's."""
@@ -38,7 +38,7 @@ class Quantity(click.ParamType):  # type: ignore[type-arg]
         return found / units_of(base).get(self.bare, 1.0)
 
 
-class Cycle(click.ParamType):  # type: ignore[type-arg]
+class CycleLength(click.ParamType):  # type: ignore[type-arg]
     """A cycle [s]: "30 Hz", "1800 rpm" or "33 ms"."""
 
     name = "cycle"
@@ -60,16 +60,17 @@ class Cycle(click.ParamType):  # type: ignore[type-arg]
 
 
 class Reading(Quantity):
-    """A number in newton, with a unit of force, or with the unit of another quantity, which it then carries."""
+    """A number in the unit of the readings, or with a unit, which it then carries."""
 
     def convert(self, value: Any, param: click.Parameter | None, ctx: click.Context | None) -> float:
-        """Return newton, or an ``InUnit``."""
+        """Return a bare number as it is, or an ``InUnit``."""
+        from chaosgym.recordings.kind import InUnit
         from chaosgym.recordings.quantities import OTHERS
-        from chaosgym.recordings.runs import InUnit
 
         number, _, unit = value.strip().rpartition(" ") if isinstance(value, str) else ("", "", "")
         if unit not in OTHERS:
-            return super().convert(value, param, ctx)
+            newtons = super().convert(value, param, ctx)
+            return InUnit(newtons, "N") if isinstance(value, str) and value.strip()[-1].isalpha() else newtons
         try:
             return InUnit(number, unit)
         except ValueError:
@@ -77,79 +78,130 @@ class Reading(Quantity):
 
 
 class FloatRange(click.FloatRange):
-    """A number in a range; click takes nan into any."""
+    """A number in a range; click takes nan into any, and ``0_1`` for 1."""
 
     def convert(self, value: Any, param: click.Parameter | None, ctx: click.Context | None) -> float:
         """Return the number."""
         number = float(super().convert(value, param, ctx))
-        if number != number:
+        if number != number or "_" in str(value):
             self.fail(f"{value!r} is no number.", param, ctx)
         return number
 
 
-COLUMN = click.option("--column", metavar="NAME", help="Column of the readings: name, number, pattern, or several.")
-UNIT = click.option("--unit", metavar="UNIT", help="Unit of the column, if the file does not name it; default N.")
-SCALE = click.option("--scale", metavar="TEXT", help="Calibration of the column: '100 mV/N', '20 N/V', '50 N/FS'.")
-SHEET = click.option("--sheet", metavar="NAME", help="Sheet of a workbook; default: the first with the column.")
-KIND = click.option(
-    "--as",
-    "kind",
-    type=click.Choice(["peaks", "series"]),
-    help="One reading a cycle, or a series over time; default: what the file and these options say.",
-)
-RATE = click.option("--rate-hz", type=Quantity("Hz"), help="Sampling rate of a series, if its file does not state it.")
-CYCLE = click.option("--cycle", "period", type=Cycle(), help="Cycle of a series; without it, the spectrum's line.")
-TACHOMETER = click.option("--tachometer", metavar="NAME", help="Column with a tachometer's pulses; a turn is a cycle.")
-PULSES = click.option(
-    "--pulses-per-revolution",
-    type=click.IntRange(1, 100_000),
-    metavar="N",
-    help="Pulses of the tachometer in a turn; default 1.",
-)
-
-
-def _sensor_error(of: Quantity) -> Callable[..., Any]:
-    return click.option(
-        "--sensor-error", type=of, help="Largest error of a reading (half width). Smaller differences are none."
-    )
-
-
-def _sensor_sigma(of: Quantity) -> Callable[..., Any]:
-    text = "Standard deviation of a reading instead. Without either it is estimated from the record."
-    return click.option("--sensor-sigma", type=of, help=text)
-
-
-SENSOR_ERROR, SENSOR_SIGMA = _sensor_error(Reading("N")), _sensor_sigma(Reading("N"))
-FORCE_ERROR, FORCE_SIGMA = _sensor_error(Quantity("N")), _sensor_sigma(Quantity("N"))
-
-ALL = (COLUMN, UNIT, SCALE, SHEET, KIND, RATE, CYCLE, TACHOMETER, PULSES, SENSOR_ERROR, SENSOR_SIGMA)
-OF_SWEEP = (COLUMN, UNIT, SCALE, SHEET, SENSOR_ERROR, SENSOR_SIGMA)
-OF_RUN_UP = (COLUMN, UNIT, SCALE, SHEET, RATE, TACHOMETER, PULSES, SENSOR_ERROR, SENSOR_SIGMA)
-
 FILE = click.argument("file", metavar="FILE")
 
-NAMES = (
-    *("column", "unit", "scale", "sheet", "kind", "rate_hz", "period"),
-    *("tachometer", "pulses_per_revolution", "sensor_error", "sensor_sigma"),
-)
-"""Fields of ``RecordingOptions`` that options set."""
+
+class Fact(NamedTuple):
+    """What an option of KEY=VALUE may state: the field that it sets, type, an example, and its meaning for people."""
+
+    field: str
+    type: click.ParamType  # type: ignore[type-arg]
+    example: str
+    help: str
+
+
+ERROR = "Largest error of a reading (half width). Smaller differences are none."
+SIGMA = "Standard deviation of a reading instead. Without either it is estimated from the record."
+RATE = "Sampling rate of a series, if its file does not state it."
+
+FORCE_ERROR = click.option("--sensor-error", type=Quantity("N"), help=ERROR)
+"""Error of the readings of a machine's sensors, which are of forces."""
+
+KEYS = {
+    "column": Fact("column", click.STRING, "NAME", "Column of the readings: name, number, pattern, or several."),
+    "unit": Fact("unit", click.STRING, "kN", "Unit of the column, if the file does not name it; default N."),
+    "scale": Fact("scale", click.STRING, "'100 mV/N'", "Calibration of the column: '100 mV/N', '20 N/V', '50 N/FS'."),
+    "sheet": Fact("sheet", click.STRING, "NAME", "Sheet of a workbook; default: the first with the column."),
+    "as": Fact(
+        "kind", click.Choice(["peaks", "series"]), "series", "One reading a cycle, or a series; default: by the file."
+    ),
+    "rate-hz": Fact("rate_hz", Quantity("Hz"), "1000", RATE),
+    "cycle": Fact("period", CycleLength(), "'30 Hz'", "Cycle of a series; without it, estimated from the series."),
+    "tachometer": Fact("tachometer", click.STRING, "NAME", "Column with a tachometer's pulses; a turn is a cycle."),
+    "pulses-per-revolution": Fact(
+        "pulses_per_revolution", click.IntRange(1, 100_000), "60", "Pulses of the tachometer in a turn; default 1."
+    ),
+    "sensor-error": Fact("sensor_error", Reading("N"), "'1 N'", ERROR),
+    "sensor-sigma": Fact("sensor_sigma", Reading("N"), "'0.3 N'", SIGMA),
+}
+"""What may be stated of a file of readings, by the name of its option; ``--read KEY=VALUE`` takes each."""
+
+DAILY = ("column", "as", "rate-hz", "cycle", "sensor-error")
+"""Keys that are options too, where a command reads a recording."""
+
+OF_SWEEP = ("column", "unit", "scale", "sheet", "sensor-error", "sensor-sigma")
+OF_RUN_UP = (*OF_SWEEP, "rate-hz", "tachometer", "pulses-per-revolution")
+OF_STREAM = ("column", "unit", "scale", "sensor-error", "sensor-sigma")
+"""Keys of a measured sweep, of a run-up and of a stream, which has forces alone."""
 
 
 def recording_options(
-    group: Iterable[Callable[..., Any]] = ALL,
+    shown: Iterable[str] = DAILY, keys: Iterable[str] = tuple(KEYS)
 ) -> Callable[[Callable[..., None]], Callable[..., None]]:
-    """Add a group of options; the function receives them as ``options``, a ``RecordingOptions``."""
+    """Add options of a file of readings; the function receives them as ``options``, a ``RecordingOptions``.
+
+    Parameters
+    ----------
+    shown
+        Keys that are options of their own.
+    keys
+        Those that ``--read`` takes.
+    """
+    allowed = {key: KEYS[key] for key in keys}
 
     def add(function: Callable[..., None]) -> Callable[..., None]:
         @functools.wraps(function)
-        def wrapped(**keywords: Any) -> None:
-            from chaosgym.recordings.runs import RecordingOptions
+        def wrapped(*, read: tuple[str, ...], **keywords: Any) -> None:
+            from chaosgym.recordings.kind import RecordingOptions
 
-            stated = {name: keywords.pop(name) for name in NAMES if name in keywords}
-            function(options=RecordingOptions(**stated), **keywords)
+            fields = {one.field for one in allowed.values()}
+            given = {name: keywords.pop(name) for name in fields if name in keywords}
+            function(options=RecordingOptions(**stated("--read", read, allowed, given)), **keywords)
 
-        for option in reversed([*group]):
-            wrapped = option(wrapped)
+        wrapped = _read_option([key for key in allowed if key not in shown])(wrapped)
+        for key in reversed([*shown]):
+            wrapped = _own_option(key)(wrapped)
         return wrapped
 
     return add
+
+
+def _own_option(key: str) -> Callable[..., Any]:
+    """A key as an option of its own."""
+    one = KEYS[key]
+    metavar = "NAME" if key in ("column", "tachometer") else "N" if key == "pulses-per-revolution" else None
+    return click.option(f"--{key}", one.field, type=one.type, metavar=metavar, help=one.help)
+
+
+def _read_option(keys: Iterable[str]) -> Callable[..., Any]:
+    """``--read``, with the keys that have no option of their own."""
+    text = f"What else is known of the file, repeatable: {', '.join(f'{key}={KEYS[key].example}' for key in keys)}."
+    return click.option("--read", multiple=True, metavar="KEY=VALUE", help=text)
+
+
+def stated(name: str, texts: Iterable[str], allowed: Mapping[str, Fact], given: Mapping[str, Any]) -> dict[str, Any]:
+    """Values by their fields, of a repeatable option of KEY=VALUE such as ``--read``, beside those already given."""
+    found = dict(given)
+    for text in texts:
+        key, value = _stated(name, text, allowed)
+        if found.get(allowed[key].field) is not None:
+            raise click.UsageError(f"{key} is stated twice; allowed: once")
+        found[allowed[key].field] = value
+    return found
+
+
+def _stated(name: str, text: str, allowed: Mapping[str, Fact]) -> tuple[str, Any]:
+    """Key and value of one KEY=VALUE."""
+    key, equals, written = text.partition("=")
+    key = key.strip().removeprefix("--").replace("_", "-")
+    if not equals:
+        raise click.UsageError(f"{name} {text!r} is no KEY=VALUE; allowed: {', '.join(allowed)}")
+    if key not in allowed:
+        hint = nearest_or(f"allowed: {', '.join(allowed)}", key, allowed)
+        raise click.UsageError(f"{name} has no key {key!r}; {hint}")
+    option = click.Option([f"--{key}"])
+    option.opts = [f"{name} {key}"]
+    try:
+        return key, allowed[key].type.convert(written.strip(), option, click.get_current_context(silent=True))
+    except click.BadParameter as error:
+        raise click.UsageError(f"{name} {text!r}: {error.message}") from error

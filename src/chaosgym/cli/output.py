@@ -28,14 +28,30 @@ NOBODY_READS = 141
 PATIENCE_SECONDS = 2.0
 """Time after which a computation says that it goes on."""
 
+TIMED_CYCLES = (4, 64)
+"""Cycles by which the time of many is estimated: the second number where the first does not rule out a wait."""
+
+DIAGNOSED = 2.0
+"""Most processor time of a cycle that is diagnosed, over that of one that is simulated (measured)."""
+
 NOTES = "chaosgym.notes"
 """Where a command keeps the notes on its machines."""
+
+MODEL = "chaosgym.model"
+"""Where it keeps the accuracy of its machine's model."""
 
 
 def note_machine(machine: Any) -> None:
     """Let the command's answer end with what a user should know of a machine."""
     kept = click.get_current_context().meta.setdefault(NOTES, [])
     kept += [note for note in machine.notes if note not in kept]
+
+
+def note_model(accuracy: Any) -> None:
+    """Let the command's answer name a machine's model and its estimated error, and what is to be said of these."""
+    meta = click.get_current_context().meta
+    meta[MODEL] = accuracy
+    meta.setdefault(NOTES, []).extend([accuracy.warning] if accuracy.warning else [])
 
 
 def emit(
@@ -67,11 +83,11 @@ def _save(figure: "Callable[[Any], Figure]", path: Path) -> None:
 def _print(result: Mapping[str, Any], as_json: bool, lines: Callable[[], list[str]]) -> None:
     context = click.get_current_context(silent=True)
     notes = context.meta.get(NOTES, ()) if context else ()
+    model = context.meta.get(MODEL) if context else None
     try:
-        shown = {**result, "notes": list(notes)} if notes else result
-        for line in (
-            [json.dumps(shown, allow_nan=False)] if as_json else [*lines(), *(f"note: {note}" for note in notes)]
-        ):
+        shown = {**result, **({"model": model.as_dict()} if model else {}), **({"notes": list(notes)} if notes else {})}
+        told = [*([model.line] if model else []), *(f"note: {note}" for note in notes)]
+        for line in [json.dumps(shown, allow_nan=False, default=_numbers)] if as_json else [*lines(), *told]:
             click.echo(line, nl=False)  # Python overlooks that a single large write was cut off; the next one is not
             click.echo()
         if sys.stdout is not None:  # None where it was closed before the start
@@ -80,6 +96,11 @@ def _print(result: Mapping[str, Any], as_json: bool, lines: Callable[[], list[st
         # what is left in the buffer goes nowhere at the end of the process
         os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
         sys.exit(NOBODY_READS)
+
+
+def _numbers(array: Any) -> Any:
+    """What JSON can hold of an array; only made where it is printed, since a list takes four times the memory."""
+    return array.tolist()
 
 
 def verdict_lines(subject: str, verdict: Any, forces: Iterable[str], notes: Iterable[str] = ()) -> list[str]:
@@ -97,9 +118,42 @@ def force_line(summary: Mapping[str, float]) -> str:
 
 
 def reading_line(summary: Mapping[str, float], unit: str) -> str:
-    """How readings in any unit lie."""
-    told = {name: f"{summary[name]:.4g} {unit}" for name in ("min", "max", "mean", "std")}
+    """How readings in any unit lie; what is a rounding of the largest is none."""
+    least = 1e-12 * max(abs(summary["min"]), abs(summary["max"]))
+    shown = {name: summary[name] if abs(summary[name]) > least else 0.0 for name in ("min", "max", "mean", "std")}
+    told = {name: f"{value:.4g} {unit}" for name, value in shown.items()}
     return f"{told['min']} to {told['max']}, mean {told['mean']}, standard deviation {told['std']}"
+
+
+def announce(what: str, machine: Any, cycles: float, *, besides: float = 0.0) -> None:
+    """Say on standard error how much processor time some cycles of a machine take, if that is worth a word.
+
+    ``besides`` are seconds of what is no cycle of this machine.
+    """
+    seconds = besides + seconds_of(machine, cycles)
+    if seconds > PATIENCE_SECONDS:
+        from chaosgym.units import duration  # few commands take so long
+
+        click.echo(f"{what}: up to about {duration(seconds, 2)} of processor time", err=True)
+
+
+def seconds_of(machine: Any, cycles: float) -> float:
+    """Processor time [s] that some cycles of a machine take, by a few of them; 0 if it can't be run."""
+    from chaosgym.errors import SimulationError
+    from chaosgym.simulation import simulate
+
+    seconds = 0.0
+    for timed in TIMED_CYCLES:
+        try:
+            simulate(machine, 1)
+            began = time.process_time()
+            simulate(machine, timed)
+        except SimulationError:
+            return 0.0
+        seconds = cycles * (time.process_time() - began) / timed
+        if seconds < 0.5 * PATIENCE_SECONDS:
+            break
+    return seconds
 
 
 @contextmanager
@@ -156,36 +210,43 @@ def picture_path(plot: str | None, stem: str, formats: tuple[str, ...] | None = 
     return free_name(stem) if plot == UNNAMED else check_picture(Path(plot), formats or FORMATS)
 
 
-def check_target(path: str | Path, overwrite: bool) -> None:
-    """Check that a table may be written before it is computed.
+def check_target(path: str | Path, overwrite: bool, endings: tuple[str, ...] = (".csv", ".parquet")) -> None:
+    """Check that a file, by default a table, may be written before it is computed.
 
     Raises
     ------
     DatasetError
-        If the name ends in neither .csv nor .parquet, the folder is missing, or the file exists.
+        If the name ends in none of the ``endings``, the folder is missing, or the file exists.
     """
     from chaosgym.errors import DatasetError
-    from chaosgym.files import replaceable
+    from chaosgym.files import check_place
 
     target = Path(path)
-    if target.suffix not in (".csv", ".parquet"):
-        raise DatasetError(f"{path} ends in {target.suffix or 'nothing'}; allowed: .csv, .parquet")
+    if target.suffix not in endings:
+        raise DatasetError(f"{path} ends in {target.suffix or 'nothing'}; allowed: {', '.join(endings)}")
     if not target.absolute().parent.is_dir():
         raise DatasetError(f"{target.absolute().parent} is no folder; choose another file")
     if os.path.lexists(target) and not overwrite:
         raise DatasetError(f"{path} exists; use --overwrite or another name")
-    replaceable(target)
+    check_place(target)
 
 
 def write_table(columns: "Mapping[str, ArrayLike]", path: str | Path) -> None:
     """Write columns by name as CSV or Parquet."""
+    import numpy as np
     import pyarrow as pa
     import pyarrow.csv
     import pyarrow.parquet as pq
 
     from chaosgym.files import write_atomically
 
-    table = pa.table({name: pa.array(values) for name, values in columns.items()})
+    # a column of a larger array would become an object for each number, 36 times the memory
+    table = pa.table(
+        {
+            name: np.ascontiguousarray(values) if isinstance(values, np.ndarray) else pa.array(values)
+            for name, values in columns.items()
+        }
+    )
     if Path(path).suffix == ".csv":
         options = pyarrow.csv.WriteOptions(quoting_style="none")
         write_atomically(Path(path), lambda target: pyarrow.csv.write_csv(table, target, write_options=options))

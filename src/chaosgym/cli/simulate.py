@@ -8,10 +8,10 @@ import click
 import numpy as np
 
 from chaosgym.cli.machine_options import machine_command
-from chaosgym.cli.output import AS_JSON, check_target, emit, picture_path, plot_option, write_table
+from chaosgym.cli.output import AS_JSON, announce, check_target, emit, picture_path, plot_option, write_table
 
 
-@machine_command
+@machine_command(chooses="point")
 @click.option("--cycles", type=click.IntRange(1, 10**7), default=100, show_default=True, help="Cycles to record.")
 @click.option("--transient", type=click.IntRange(0, 10**7), default=0, show_default=True, help="Cycles to skip first.")
 @click.option("--out", type=click.Path(dir_okay=False), help="Peak force of every cycle, all sides: CSV or Parquet.")
@@ -37,7 +37,7 @@ def simulate(
     if out or series_out:
         for path in filter(None, (out, series_out)):
             check_target(path, overwrite)
-    run(machine, 1)  # compiles, or loads what is compiled
+    announce("simulate", machine, transient + cycles)  # a first run compiles, or loads what is compiled
     start = time.process_time()
     record = run(machine, cycles, transient=transient, samples_per_cycle=samples if series_out else 0, progress=True)
     seconds_per_cycle = (time.process_time() - start) / (transient + cycles)
@@ -47,11 +47,11 @@ def simulate(
     worst = machine.sides[record.worst_side]
     result = {
         "machine": machine.name,
-        "peak_force_N": surfaces[worst].tolist(),
+        "peak_force_N": surfaces[worst],
         "worst_surface": worst,
-        "surfaces_peak_force_N": {side: peaks.tolist() for side, peaks in surfaces.items()},
-        "impacts": record.impacts.sum(axis=1).tolist(),
-        "contact_fraction": contact.tolist(),
+        "surfaces_peak_force_N": surfaces,
+        "impacts": record.impacts.sum(axis=1),
+        "contact_fraction": contact,
         "seconds_per_cycle": seconds_per_cycle,
     }
     no_contact = not record.peak_force.any()
@@ -75,6 +75,7 @@ def simulate(
         result["drive"] = drive.as_dict()
     lines = [
         f"{machine.name}: {cycles} cycles after {transient}",
+        *_monitored(machine),
         *(
             f"{f'peak force, {side}':25s} {peaks.min():.2f} to {peaks.max():.2f} N, mean {peaks.mean():.2f} N"
             for side, peaks in surfaces.items()
@@ -91,6 +92,15 @@ def simulate(
     emit(result, as_json, lambda: lines, picture, lambda plots: plots.simulation_figure(record, transient))
 
 
+def _monitored(machine: Any) -> list[str]:
+    """Which of several joints is shown, where the sides do not say so."""
+    from chaosgym.machines.parameters import parameters_of
+
+    about = parameters_of(machine).get("monitored")
+    several = about is not None and len(about.choices) > 1 and not machine.joints
+    return [f"monitored joint           {machine.monitored}"] if several else []
+
+
 def _largest(sensor_peak: Any) -> list[float]:
     return [] if sensor_peak is None else [float(force) for force in sensor_peak.max(axis=0)]
 
@@ -99,7 +109,7 @@ def _largest(sensor_peak: Any) -> list[float]:
 @click.option("--markdown", is_flag=True, help="Print the table of the documentation.")
 @plot_option()
 def show(machine: Any, markdown: bool, plot: str | None, as_json: bool) -> None:
-    """Print every parameter of a machine, where the number comes from, and what follows; --plot draws a mechanism."""
+    """Print every parameter of a machine, where the number comes from, and what follows; --plot draws it."""
     from chaosgym.machines.parameters import markdown_table, origin_of, parameters_of
 
     picture = picture_path(plot, f"show-{machine.name}")
@@ -119,6 +129,7 @@ def show(machine: Any, markdown: bool, plot: str | None, as_json: bool) -> None:
         "machine": machine.name,
         "parameters": {name: getattr(machine, name) for name in described},
         "natural_frequencies_hz": frequencies,
+        "mover": machine.moving.how,
         "provenance": provenance,
         **{name: getattr(machine, name) for name in ("degrees_of_freedom", "sensors") if machine.degrees_of_freedom},
     }
@@ -140,6 +151,7 @@ def show(machine: Any, markdown: bool, plot: str | None, as_json: bool) -> None:
             rows.append(f"{name:30s} {shown:>11s} {unit:8s} {origin['grade']:10s} {origin['source']}")
         if frequencies:
             rows.append("natural frequencies [Hz]: " + ", ".join(f"{value:.1f}" for value in frequencies))
+        rows.append(f"moved by {machine.moving.how}")
         for name in ("degrees_of_freedom", "sensors"):
             if names := getattr(machine, name):
                 rows.append(f"{len(names)} {name.replace('_', ' ')}: {', '.join(names)}")

@@ -12,7 +12,17 @@ import pyarrow.parquet as pq
 
 from chaosgym.classifier.shipped import has_classifier
 from chaosgym.control import controllers
-from chaosgym.control.maps import FLEET, FLEET_SEED, Maps, fleet_maps, maps_of, model_keywords
+from chaosgym.control.controllers.table import JOBS
+from chaosgym.control.maps import (
+    FLEET,
+    FLEET_SEED,
+    JUDGED_CYCLES,
+    SETTLING_CYCLES,
+    Maps,
+    fleet_maps,
+    maps_of,
+    model_keywords,
+)
 from chaosgym.control.policies.shipped import shipped_name
 from chaosgym.control.rollout import Played, Policy, play
 from chaosgym.control.scores import ONE, SAFE, ZERO
@@ -20,7 +30,9 @@ from chaosgym.envs.pool import Pool
 from chaosgym.envs.task import Status
 from chaosgym.envs.vector_env import native_envs
 from chaosgym.errors import DatasetError, ParameterError
-from chaosgym.files import parquet_of, write_atomically
+from chaosgym.files import write_atomically
+from chaosgym.numbers import whole
+from chaosgym.parquet import parquet_of
 
 COLUMNS = ("contender", "knows", "seed", "machine", "job_return", "type_iii", "deviation", "damage", "largest_force")
 """Columns of a comparison's table, one row a job. ``LOAD`` is no part of files of earlier versions."""
@@ -36,6 +48,10 @@ CLASSIFIED = "back off, by the classifier"
 
 WITHOUT_MODELS = (ZERO, ONE, "own map, demands known", "back off", SAFE, "best felt", "kriging")
 """Contenders that need no model: those of a pool of machines."""
+
+OF_OWN_MAPS = (ONE, "own map, demands known")
+OF_A_FLEET = ("best constant trim", "best common schedule, demands known", "bandit", "belief")
+"""Contenders that need maps of the machines played, and of simulated ones."""
 
 WORN_LEVELS = 5
 """Clearances at which a machine that wears is mapped."""
@@ -172,9 +188,7 @@ def compare(
     kind = known.nominal
     subject = subject_of(env if kind.definition == kind.name else f"{env} ({kind.definition})", **keywords)
     kept = known.settings.variants.count
-    count = kept if machines is None else machines
-    if count > kept:
-        raise ParameterError(f"machines = {count} is out of range; allowed: up to {kept}, of those kept for evaluation")
+    count = kept if machines is None else whole("machines", machines, 1, kept)
     table = read_comparison(out, subject) if out.exists() else None
     work: list[tuple[str, int, Policy | None]] = [(name, 0, None) for name in chosen]
     work += [(name, seed, policy) for name, seeds in (policies or {}).items() for seed, policy in enumerate(seeds)]
@@ -189,6 +203,26 @@ def compare(
         write_comparison(table, out)
     assert table is not None
     return table
+
+
+def most_cycles(env: str, *, machines: int | None = None, only: Iterable[str] | None = None, **keywords: Any) -> int:
+    """Cycles that a comparison from its beginning runs, those of maps and tables from which controllers learn included.
+
+    Examples
+    --------
+    >>> from chaosgym.control.comparison import most_cycles
+    >>> task = "chaosgym/ImpactBeamTolerance-v1"
+    >>> most_cycles(task, machines=8, only=["kriging"]) < 0.01 * most_cycles(task, machines=8)
+    True
+    """
+    envs = native_envs(env, **keywords)
+    task = envs.task
+    names = list(Contenders(env, keywords, False).makers()) if only is None else list(only)
+    count = envs.settings.variants.count if machines is None else machines
+    job, swept = task.steps * task.cycles_per_step, len(task.grid) * (SETTLING_CYCLES + JUDGED_CYCLES)
+    own = count * swept * (WORN_LEVELS if task.wear > 0.0 else 1) * any(name in OF_OWN_MAPS for name in names)
+    fleets = FLEET * swept * (any(name in OF_A_FLEET for name in names) + ("belief, exact model" in names))
+    return len(names) * count * job + own + fleets + JOBS * job * ("table" in names)
 
 
 def _played(table: pa.Table | None, name: str, seed: int) -> set[int]:

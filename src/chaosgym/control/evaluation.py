@@ -11,6 +11,7 @@ from gymnasium.spaces import Discrete
 from numpy.typing import NDArray
 
 from chaosgym.control.comparison import Contenders, job_rows, joined, shipped_comparison
+from chaosgym.control.guard import GuardedPolicy
 from chaosgym.control.policies.policy import TrainedPolicy, load_policy
 from chaosgym.control.readings import Readings
 from chaosgym.control.rollout import Played, Policy, play
@@ -18,6 +19,7 @@ from chaosgym.control.scores import ONE, ZERO, Scores
 from chaosgym.envs.memory import SpeedMemory
 from chaosgym.errors import ModelFileError
 from chaosgym.files import first_line
+from chaosgym.numbers import whole
 
 NAME = "this policy"
 
@@ -51,6 +53,13 @@ class Evaluation:
     deviation: float
     played: Played
 
+    def __repr__(self) -> str:
+        low, high = self.interval
+        return (
+            f"<score {self.score:z.2f} ({low:z.2f} to {high:z.2f}), return {self.mean_return:.2f}, Type III "
+            f"{self.type_iii:.1%}, {self.deviation:.3g} off the demand>"
+        )
+
 
 class _Function:
     """A function from one observation to one action."""
@@ -78,6 +87,11 @@ class _SB3:
     def __init__(self, model: Any) -> None:
         self._model, self._memory = model, cast(SpeedMemory | None, None)
         self._normalise = model.get_vec_normalize_env()
+        if self._normalise is None and _saw_normalised(model):
+            raise ModelFileError(
+                "the model was trained behind VecNormalize, whose statistics are missing: a .zip does not hold them; "
+                "pass the model with its environment, as of PPO.load(FILE, env=VecNormalize.load(STATISTICS, envs))"
+            )
         self.keywords = {"action": "trim" if isinstance(model.action_space, Discrete) else "continuous"}
 
     def start(self, envs: Any) -> None:
@@ -107,6 +121,16 @@ class _SB3:
         return self._readings.answer(actions)
 
 
+OUTSIDE = 0.1
+"""Share of a model's last observations beyond their bounds from which on they were normalised."""
+
+
+def _saw_normalised(model: Any) -> bool:
+    """Whether the last observations of training, which stable-baselines3 saves, lie beyond what the sensors give."""
+    last, space = getattr(model, "_last_obs", None), model.observation_space
+    return last is not None and bool(np.mean((last < space.low) | (last > space.high)) > OUTSIDE)
+
+
 def policy_of(given: Any, **keywords: Any) -> Policy:
     """Return what ``play`` runs.
 
@@ -121,7 +145,7 @@ def policy_of(given: Any, **keywords: Any) -> Policy:
     Raises
     ------
     ModelFileError
-        If a file is none of these.
+        If a file is none of these, or the statistics of its ``VecNormalize`` are missing.
     """
     if isinstance(given, str | Path):
         path = Path(given)
@@ -164,6 +188,7 @@ def evaluate(
     env: str = "chaosgym/ImpactBeamTolerance-v1",
     *,
     machines: int = 256,
+    guard: bool = False,
     progress: bool = False,
     **keywords: Any,
 ) -> Evaluation:
@@ -177,11 +202,18 @@ def evaluate(
         Id of the environment, or the file of a machine.
     machines
         How many, from the first on.
+    guard
+        Whether it plays behind a guard, as ``chaosgym.Operator`` and ``chaosgym run-agent`` play it.
     progress
         Show progress bars on standard error.
     keywords
         Of the environment. The scale of the default ones is shipped for the beam's tolerances, and for fewer machines
         of other ids and of the fleet's test split; any other scale is computed first, in minutes.
+
+    Raises
+    ------
+    ParameterError
+        If it is to be guarded and does not know what was usual in training.
 
     Examples
     --------
@@ -189,7 +221,9 @@ def evaluate(
     >>> round(follows.deviation, 3)
     0.016
     """
+    machines = whole("machines", machines, 1, 10**6)
     runs = policy_of(policy, **keywords)
+    runs = GuardedPolicy(runs) if guard else runs
     played = play(runs, env, range(machines), progress=NAME if progress else None, **keywords)
     scale = shipped_comparison(env, **keywords)
     if scale is None or pa.compute.max(scale["machine"]).as_py() < machines - 1:

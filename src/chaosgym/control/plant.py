@@ -1,22 +1,9 @@
-"""A job at a machine that is not simulated here: a class of yours, or a program that reads and writes lines.
+"""A job at a plant, a machine that is not simulated here (``chaosgym.plants``)."""
 
-A plant has two methods: ``reset()``, before a job, and ``run(speed, cycles)``, which runs it for some cycles at
-a speed and returns the largest force of each cycle [N]; with two stops (cycles, 2), the largest and the smallest force
-of each. A mapping may tell more: ``peaks``, the measured ``speed``, and what a trained policy looks at, ``impacts``
-(contacts a cycle) and ``bouncing`` (share of the half cycle on one side). A method ``stop()`` brings the machine to
-rest; it is called after every job, however that ends.
-"""
-
-import json
-import os
-import sys
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass, field
-from importlib import import_module
-from queue import Empty, Queue
-from threading import Thread
-from typing import Any, Protocol, TextIO
+from typing import Any
 
 import numpy as np
 
@@ -26,24 +13,7 @@ from chaosgym.envs.task import Task, demand_of
 from chaosgym.envs.variants import HELD_OUT_SEED
 from chaosgym.errors import ParameterError
 from chaosgym.files import first_line
-
-EXTRAS = ("impacts", "bouncing", "speed")
-"""What ``run`` may tell beside the peaks."""
-
-ANSWER_SECONDS = 600.0
-"""Time for which a program behind lines is waited for."""
-
-
-class Plant(Protocol):
-    """A machine at work. It may have ``stop()`` too, which brings it to rest after a job."""
-
-    def reset(self) -> None:
-        """Bring the machine to rest, before a job."""
-        ...
-
-    def run(self, speed: float, cycles: int) -> Any:
-        """Run ``cycles`` operating cycles at a speed; return the peaks [N], (cycles,), or a mapping with them."""
-        ...
+from chaosgym.plants.plant import Plant, named, readings_of
 
 
 class PlantError(ParameterError):
@@ -58,103 +28,10 @@ class PlantError(ParameterError):
     worked: "Worked | None" = None
 
 
-class Lines:
-    """A plant behind two streams of text, one line each way.
+class Interrupted(KeyboardInterrupt):
+    """Ctrl-C in a job, with the steps that were played before, as of ``PlantError``."""
 
-    It is told ``reset``, which has no answer, and ``run SPEED CYCLES``, whose answer is a line of as many forces [N],
-    or one JSON object with ``peaks`` and what else the sensors tell; ``done`` comes last.
-
-    Parameters
-    ----------
-    heard, told
-        What the program writes, and what it reads.
-    seconds
-        For which an answer is waited for.
-    """
-
-    def __init__(self, heard: TextIO, told: TextIO, seconds: float = ANSWER_SECONDS) -> None:
-        self._heard, self._told, self._seconds = heard, told, seconds
-        self._lines: Queue[str] | None = None
-
-    def reset(self) -> None:
-        """Tell the plant to come to rest."""
-        print("reset", file=self._told, flush=True)
-
-    def run(self, speed: float, cycles: int) -> Any:
-        """Request a step, and read the line that answers it."""
-        print(f"run {speed:.10g} {cycles}", file=self._told, flush=True)
-        if self._lines is None:
-            self._lines = Queue()
-            Thread(target=self._listen, args=(self._lines,), daemon=True).start()
-        try:
-            line = self._lines.get(timeout=self._seconds)
-        except Empty:
-            raise ParameterError(f"no answer came within {self._seconds:g} s; allowed: a line of forces [N]") from None
-        if not line:
-            raise ParameterError("standard input ended; allowed: a line of forces for each line run SPEED CYCLES")
-        try:
-            return json.loads(line) if line.lstrip().startswith("{") else [float(word) for word in line.split()]
-        except ValueError:
-            raise ParameterError(f"{line.strip()[:60]!r} is no line of forces [N]; allowed: 81.2 80.9 ...") from None
-
-    def _listen(self, lines: "Queue[str]") -> None:
-        while line := self._heard.readline():
-            lines.put(line)
-        lines.put("")
-
-    def done(self) -> None:
-        """Tell the plant that the jobs have ended, if it still listens."""
-        try:
-            print("done", file=self._told, flush=True)
-        except OSError:  # what is left in the buffer goes nowhere at the end of the process
-            os.dup2(os.open(os.devnull, os.O_WRONLY), self._told.fileno())
-
-
-def plant_of(name: str, **arguments: Any) -> Plant:
-    """Make the plant ``module:Class``, found from the current folder too; ``-`` is standard input and output.
-
-    ``arguments`` are those of the class; of ``-``, ``seconds`` for which an answer is waited for.
-
-    Raises
-    ------
-    ParameterError
-        If there is no such class, if it can't be made, or if it has no ``reset`` or ``run``.
-    """
-    if name == "-":
-        with _named(name):
-            return Lines(sys.stdin, sys.stdout, **arguments)
-    module, colon, kind = name.partition(":")
-    if not (module and colon and kind):
-        raise ParameterError(
-            f"plant = {name!r} is not usable; allowed: module:Class, or - for standard input and output"
-        )
-    with _named(name), _from_here():
-        made = getattr(import_module(module), kind)(**arguments)
-    for method in ("reset", "run"):
-        if not callable(getattr(made, method, None)):
-            raise ParameterError(f"plant {name} has no method {method}; it needs reset() and run(speed, cycles)")
-    plant: Plant = made
-    return plant
-
-
-@contextmanager
-def _from_here() -> Any:
-    sys.path.insert(0, "")
-    try:
-        yield
-    finally:
-        sys.path.remove("")
-
-
-@contextmanager
-def _named(name: str) -> Iterator[None]:
-    """Report any error in the code of a plant in one line."""
-    try:
-        yield
-    except ParameterError:
-        raise
-    except Exception as error:
-        raise ParameterError(f"plant {name} failed: {type(error).__name__}: {first_line(error)}") from error
+    worked: "Worked | None" = None
 
 
 @contextmanager
@@ -168,9 +45,10 @@ def _stopped(plant: Plant, name: str) -> Iterator[None]:
             if stop:
                 stop()
         except Exception as other:
-            error.args = (f"{first_line(error)}; stop() failed too: {type(other).__name__}: {first_line(other)}",)
+            said = first_line(error) if error.args else "Ctrl-C"
+            error.args = (f"{said}; stop() failed too: {type(other).__name__}: {first_line(other)}",)
         raise
-    with _named(f"{name}: stop()"):
+    with named(f"{name}: stop()"):
         if stop:
             stop()
 
@@ -192,7 +70,9 @@ class Worked:
     lost
         Steps without a usable reading, see ``chaosgym.control.readings``.
     foreign
-        Whether a guard found the machine foreign to its policy, and followed the demand; None without a guard.
+        Whether a guard found the machine foreign to its policy; None without a guard.
+    statement
+        What it did then; "" if it did not.
     """
 
     speed: Array
@@ -203,6 +83,7 @@ class Worked:
     damage: float
     lost: int
     foreign: bool | None
+    statement: str
 
     @property
     def ran(self) -> Array:
@@ -245,8 +126,7 @@ class Worked:
                 f"  the drive did not reach the speed that was set: {miss.mean():.2f} off on average, at worst "
                 f"{self.ran[at]:.2f} instead of {self.speed[at]:.2f} in step {at + 1}"
             )
-        if self.foreign:
-            told.append("  this machine is foreign to the policy, so the guard followed the demand")
+        told += [f"  {self.statement}"] if self.statement else []
         return told + ([f"  no usable reading in {self.lost} of {len(self.speed)} steps"] if self.lost else [])
 
 
@@ -260,7 +140,7 @@ class _Log:
     peaks: list[Array] = field(default_factory=list)
     measured: list[float] = field(default_factory=list)
 
-    def worked(self, lost: int, foreign: bool | None) -> Worked | None:
+    def worked(self, operator: Operator) -> Worked | None:
         """The job; None without a step."""
         if not self.peaks:
             return None
@@ -279,8 +159,9 @@ class _Log:
             measured_speed=measured if np.isfinite(measured).any() else None,
             largest_force=float(finite.max()),
             damage=float(self.task.damage(finite.reshape(-1, finite.shape[-1])).max()),
-            lost=lost,
-            foreign=foreign,
+            lost=operator.lost,
+            foreign=operator.foreign,
+            statement=operator.statement,
         )
 
 
@@ -289,18 +170,18 @@ def work(plant: Plant, operator: Operator, job: int = 0, name: str = "") -> Work
 
     Raises
     ------
-    PlantError
-        If the plant fails, or what it returns is no reading; it has the steps that were played.
+    PlantError, Interrupted
+        If the plant fails, or what it returns is no reading, and after Ctrl-C; it has the steps that were played.
     """
     task, log = operator.task, _Log(operator.task)
     try:
         with _stopped(plant, name):
             _play(plant, operator, job, name, log)
-    except ParameterError as error:
-        told = PlantError(str(error))
-        told.worked = log.worked(operator.lost, operator.foreign)
+    except (ParameterError, KeyboardInterrupt) as error:
+        told = PlantError(str(error)) if isinstance(error, ParameterError) else Interrupted(str(error) or "Ctrl-C")
+        told.worked = log.worked(operator)
         raise told from error
-    worked = log.worked(operator.lost, operator.foreign)
+    worked = log.worked(operator)
     if worked is None:
         raise ParameterError(f"steps = {task.steps} is out of range; allowed: from 1 on")
     return worked
@@ -311,38 +192,15 @@ def _play(plant: Plant, operator: Operator, job: int, name: str, log: _Log) -> N
     task, cycles = operator.task, operator.task.cycles_per_step
     demands = demand_of(task, np.random.default_rng([HELD_OUT_SEED, job, 1]))
     start = float(np.clip(demands[0] - task.start_below, task.lowest_speed, task.highest_speed))
-    with _named(name):
+    with named(name):
         plant.reset()
     speed = operator.start(speed=start, demand=float(demands[0]))
-    peaks, told = _readings(plant, speed, max(cycles, task.run_in_cycles), name, "the run-in")
+    peaks, told = readings_of(plant, speed, max(cycles, task.run_in_cycles), name, "the run-in")
     for step, demand in enumerate(demands[:-1].tolist(), 1):
         speed = operator.next(peaks[-cycles:].max(axis=-1), demand=demand, **told)
         where = f"step {step} of {task.steps}, cycles {(step - 1) * cycles + 1} to {step * cycles}"
-        peaks, told = _readings(plant, speed, cycles, name, where)
+        peaks, told = readings_of(plant, speed, cycles, name, where)
         log.speed.append(speed)
         log.demand.append(demand)
         log.peaks.append(peaks)
         log.measured.append(told.get("speed", np.nan))
-
-
-def _readings(plant: Plant, speed: float, cycles: int, name: str, where: str) -> tuple[Array, dict[str, float]]:
-    """Peaks (cycles, sides) [N] of a step, and what else the plant told."""
-    try:
-        with _named(name):
-            answer = plant.run(speed, cycles)
-            readings: Mapping[str, Any] = answer if isinstance(answer, Mapping) else {"peaks": answer}
-            peaks = np.array(readings.get("peaks", ()), float)
-            told = {extra: float(readings[extra]) for extra in EXTRAS if readings.get(extra) is not None}
-        if peaks.shape not in ((cycles,), (cycles, 2)):
-            raise ParameterError(
-                f"plant {name} returned peaks of shape {peaks.shape}; allowed: {cycles} forces, or {cycles} pairs of "
-                "the largest and the smallest one"
-            )
-        if peaks.ndim == 1 and (bad := np.flatnonzero(peaks < 0.0)).size:
-            raise ParameterError(
-                f"plant {name} returned a peak of {peaks[bad[0]]:g} N in cycle {bad[0] + 1} of the step; allowed: "
-                "forces from 0 N on, or pairs of the largest and the smallest one"
-            )
-    except ParameterError as error:
-        raise ParameterError(f"{error} ({where})") from error
-    return np.abs(peaks.reshape(cycles, -1)), told

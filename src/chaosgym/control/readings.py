@@ -15,9 +15,7 @@ from chaosgym.envs.kernels.steps import PLACE
 from chaosgym.envs.observation import FORCE_RANGE, OBSERVATION_NAMES
 from chaosgym.envs.task import Task
 from chaosgym.errors import ParameterError
-
-LONGEST_HOLD = 2
-"""Steps without a reading for which the trim is held; from the next one on the speed is the demand (assumed)."""
+from chaosgym.plants.plant import LONGEST_HOLD
 
 FIRST_FELT = PLACE.mean_peak_force
 """Column from which on the entries of an observation are readings."""

@@ -1,6 +1,6 @@
 """Decorators of kernels: those that only compute, pieces of others, and those that move many machines.
 
-Kernels take ``njit`` from here, so that numba caches them where ``kernel_cache`` says.
+Kernels take ``njit`` from here, so that their machine code is kept where ``kernel_cache`` says.
 
 Numba counts references to every array that a function is handed, two atomic operations each, which cost more than the
 arithmetic of a short kernel. One that neither allocates nor returns an array needs no count: its caller keeps what it
@@ -8,74 +8,38 @@ works on alive.
 """
 
 from collections.abc import Callable
-from pathlib import Path
 from types import FunctionType
 from typing import Any, NamedTuple
 
-from numba import njit
-from numba.core import caching
-from numba.core.registry import CPUDispatcher
+import numba
+from numba.core.dispatcher import Dispatcher
 
-from chaosgym.core.kernel_cache import cache_folder
+from chaosgym.core.machine_code import KernelCache
 
-__all__ = ["SideBySide", "entry", "leaf", "njit", "part", "side_by_side"]
-
-# with an underscore in older versions of numba
-_Locator: Any = getattr(caching, "UserProvidedCacheLocator", None) or caching._UserProvidedCacheLocator
+__all__ = ["SideBySide", "leaf", "njit", "part", "side_by_side"]
 
 
-class _ByContent(_Locator):  # type: ignore[misc] # numba has no types
-    """Tells numba the folder of a kernel by ``kernel_cache``."""
+def njit(*, cache: bool = True, **options: Any) -> Callable[[Any], Any]:
+    """As numba's, with a cache of its own: with ``NUMBA_DISABLE_JIT`` the function itself."""
 
-    def __init__(self, py_func: Any, py_file: str) -> None:
-        self._py_file = py_file
-        self._lineno = py_func.__code__.co_firstlineno
-        self._cache_path = cache_folder(Path(py_file))
+    def decorate(function: Any) -> Any:
+        compiled: Any = numba.njit(**options)(function)
+        if cache and isinstance(compiled, Dispatcher):
+            compiled._cache = KernelCache(function)  # type: ignore[attr-defined]
+        return compiled
 
-    def get_source_stamp(self) -> str:
-        """The same stamp for every kernel: the folder is named by the hash of the sources."""
-        return ""
-
-    @classmethod
-    def from_function(cls, py_func: Any, py_file: str) -> Any:
-        """Locator of a kernel; None for functions of others."""
-        return super(_Locator, cls).from_function(py_func, py_file) if cache_folder(Path(py_file)) else None
-
-
-caching.CacheImpl._locator_classes = [_ByContent, *caching.CacheImpl._locator_classes]
-
-
-_LEAF = {"cache": True, "nogil": True, "_nrt": False, "error_model": "numpy", "no_cfunc_wrapper": True}
-
-
-def entry(function: Callable[..., Any]) -> Callable[..., Any]:
-    """Compile a ``leaf`` that Python calls."""
-    compiled: Callable[..., Any] = njit(**_LEAF)(function)
-    return compiled
+    return decorate
 
 
 def leaf(function: Callable[..., Any]) -> Callable[..., Any]:
-    """Compile a kernel that allocates no array and returns none, without reference counts.
-
-    Kernels alone call it: what takes arguments over from Python would be a tenth of all that is compiled.
-    """
-    compiled: Callable[..., Any] = njit(**_LEAF, no_cpython_wrapper=True)(function)
-    if isinstance(compiled, CPUDispatcher):
-        compiled.__class__ = _Inner
+    """Compile a kernel that allocates no array and returns none, without reference counts."""
+    compiled: Callable[..., Any] = njit(nogil=True, _nrt=False, error_model="numpy", no_cfunc_wrapper=True)(function)
     return compiled
-
-
-class _Inner(CPUDispatcher):  # type: ignore[misc] # numba has no types
-    """A kernel that Python can't call: without this the process would crash."""
-
-    def __call__(self, *arguments: Any) -> Any:
-        """Refuse."""
-        raise TypeError(f"{self.__name__} is called by kernels alone; declare it with entry, not with leaf")
 
 
 def part(function: Callable[..., Any]) -> Callable[..., Any]:
     """Always inline this kernel into its callers."""
-    compiled: Callable[..., Any] = njit(cache=True, inline="always")(function)
+    compiled: Callable[..., Any] = njit(inline="always")(function)
     return compiled
 
 
@@ -94,4 +58,4 @@ def side_by_side(function: Any) -> SideBySide:
     # numba names its cache of a function by the qualified name
     alone = FunctionType(function.__code__, function.__globals__, f"{function.__name__}_serially")
     alone.__qualname__ = alone.__name__
-    return SideBySide(njit(cache=True, nogil=True, parallel=True)(function), njit(cache=True, nogil=True)(alone))
+    return SideBySide(njit(nogil=True, parallel=True)(function), njit(nogil=True)(alone))

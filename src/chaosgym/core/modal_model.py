@@ -4,6 +4,8 @@ from typing import NamedTuple
 
 import numpy as np
 
+from chaosgym.core import matrices
+
 FREE, UPPER_STOP, LOWER_STOP = np.int64(0), np.int64(1), np.int64(2)
 """Where the tip is pressed: nowhere, or against a stop; rows of what differs between the three. Integers of numpy, as
 numba compiles a kernel anew for each plain number that it is called with."""
@@ -107,7 +109,7 @@ class ModalImpactModel(NamedTuple):
 def with_drive_from(model: ModalImpactModel, phase: float) -> ModalImpactModel:
     """The model whose cycles begin at a phase of the drive, as a share of the cycle."""
     angle = 2.0 * np.pi * phase * np.arange(1.0, model.drive.shape[1] + 1.0)
-    cosine, sine, turned = np.cos(angle)[:, None], np.sin(angle)[:, None], np.empty_like(model.drive)
+    cosine, sine, turned = matrices.cos(angle)[:, None], matrices.sin(angle)[:, None], np.empty_like(model.drive)
     turned[:, :, 0] = model.drive[:, :, 0] * cosine + model.drive[:, :, 1] * sine
     turned[:, :, 1] = model.drive[:, :, 1] * cosine - model.drive[:, :, 0] * sine
     return model._replace(drive=turned)

@@ -8,7 +8,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from chaosgym.core.kernel import njit
+from chaosgym.core.kernel import njit, part
 
 GRID = 1e-3
 """Spacing of the speeds at which cycles are run, as a share: models of a machine are kept for each."""
@@ -24,21 +24,29 @@ class Crank(NamedTuple):
     ----------
     inertia, still, viscous : (B,)
         Of everything that turns [kg m^2]; torque that resists [N m], and that in proportion to the speed [N m s].
-    slope : float
-        Torque [N m s] that the motor loses per speed.
-    no_load_rate : float
-        Speed [rad/s] at which the motor gives none, at its full line.
+    torques, rates : (K,)
+        The motor's curve: its torque [N m] at speeds [rad/s] from 0 on, straight lines between; none at the last.
     """
 
     inertia: np.ndarray
     still: np.ndarray
     viscous: np.ndarray
-    slope: float
-    no_load_rate: float
+    torques: np.ndarray
+    rates: np.ndarray
+
+
+@part
+def line_at(torques, rates, rate, shift):
+    """Line of a motor's curve, which is moved down by a speed ``shift``, at a rate: torque at rest, and its fall."""
+    i = 0
+    while i < len(rates) - 2 and rate + shift >= rates[i + 1]:
+        i += 1
+    slope = (torques[i] - torques[i + 1]) / (rates[i + 1] - rates[i])
+    return torques[i] + slope * (rates[i] - shift), slope
 
 
 @njit(cache=True, nogil=True)
-def revolution(inertia, still, viscous, slope, set_rate, rate):
+def revolution(inertia, still, viscous, torques, rates, set_rate, rate):
     """Turn a crank by one revolution from ``rate`` [rad/s], with a motor that gives no torque at ``set_rate``.
 
     Returns
@@ -46,13 +54,14 @@ def revolution(inertia, still, viscous, slope, set_rate, rate):
     (stopped, rate, time, work, lowest, highest)
         Step in which it stops, or ``TURNS``; its rate at the end; time [s] and the motor's work [J]; ends of its rate.
     """
-    steps = len(still)
+    steps, shift = len(still), rates[-1] - set_rate
     width = 2.0 * math.pi / steps
     time, work, low, high = 0.0, 0.0, rate, rate
     for k in range(steps):
         after = (k + 1) % steps
+        start, slope = line_at(torques, rates, rate, shift)
         taken, half = slope + viscous[k], 0.5 * width * (slope + viscous[after])
-        given = 2.0 * slope * set_rate - still[k] - still[after] - taken * rate
+        given = 2.0 * start - still[k] - still[after] - taken * rate
         left = 0.5 * inertia[k] * rate**2 + 0.5 * width * given
         square = half**2 + 2.0 * inertia[after] * left
         # a crank that does not gain from rest stands still
@@ -60,7 +69,7 @@ def revolution(inertia, still, viscous, slope, set_rate, rate):
             return k, rate, time, work, low, high
         faster = (math.sqrt(square) - half) / inertia[after]
         time += 2.0 * width / (rate + faster)
-        work += 0.5 * width * slope * (2.0 * set_rate - rate - faster)
+        work += 0.5 * width * (2.0 * start - slope * (rate + faster))
         rate = faster
         low, high = min(low, rate), max(high, rate)
     return TURNS, rate, time, work, low, high
@@ -70,24 +79,25 @@ def revolution(inertia, still, viscous, slope, set_rate, rate):
 def turn_cranks(cranks, which, set_rates, last, rates, speeds, told, stalled):
     """Turn the cranks ``which`` (k,) of a batch of ``Crank``, from ``rates`` (N,) [rad/s] on, which go along.
 
-    ``set_rates`` (k,) [rad/s] at which the motors give no torque, at most those of their full lines. Written are
+    ``set_rates`` (k,) [rad/s] at which the motors give no torque, at most those of their curves. Written are
     ``speeds`` (k, cycles) [rpm], the mean of each cycle; ``told`` (k, 3), mean speed [rpm], torque [N m] and power [W]
     of the ``last`` cycles; and whether each has ``stalled`` (k,). One that stalls is told at rest; its speeds go on as
     they were, so that its gaps can be moved.
     """
     cycles = speeds.shape[1]
     for k, i in enumerate(which):
-        slope, set_rate = cranks.slope[i], min(set_rates[k], cranks.no_load_rate[i])
+        torques, curve = cranks.torques[i], cranks.rates[i]
+        set_rate = min(set_rates[k], curve[-1])
         speeds[k] = 30.0 / math.pi * set_rate
         time, work, rate = 0.0, 0.0, rates[i]
         stalled[k] = False
         for cycle in range(cycles):
             stopped, rate, spent, done, _, _ = revolution(
-                cranks.inertia[i], cranks.still[i], cranks.viscous[i], slope, set_rate, rate
+                cranks.inertia[i], cranks.still[i], cranks.viscous[i], torques, curve, set_rate, rate
             )
             if stopped != TURNS:
                 stalled[k], rates[i] = True, 0.0
-                told[k, 0], told[k, 1], told[k, 2] = 0.0, slope * set_rate, 0.0
+                told[k, 0], told[k, 1], told[k, 2] = 0.0, line_at(torques, curve, 0.0, curve[-1] - set_rate)[0], 0.0
                 break
             speeds[k, cycle:] = 60.0 / spent
             if cycle >= cycles - last:

@@ -6,7 +6,8 @@ assessment.verdict, improve(assessment).best
 """
 
 from chaosgym.design.bearing import Criteria, variation_region
-from chaosgym.design.improve import Improvement, Trial, improve
+from chaosgym.design.improve import improve
 from chaosgym.design.methodology import Assessment, assess
+from chaosgym.design.trials import Improvement, Trial
 
 __all__ = ["Assessment", "Criteria", "Improvement", "Trial", "assess", "improve", "variation_region"]

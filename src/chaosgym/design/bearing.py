@@ -18,12 +18,13 @@ from chaosgym.design.reliability import (
     reliability,
     safety_factor,
 )
-from chaosgym.design.told import listed
+from chaosgym.design.texts import listed
 from chaosgym.diagnosis import Tolerance
 from chaosgym.errors import ParameterError
 from chaosgym.machines import Machine
 from chaosgym.machines.parameters import by_field, check_parameter, parameter, parameters_of
-from chaosgym.numbers import shown
+from chaosgym.numbers import number, shown
+from chaosgym.plain import plain
 
 STRENGTH = ("strength", "strength_deviation", "contact_radius", "contact_modulus")
 """Criteria that a reliability rests on."""
@@ -97,8 +98,8 @@ class Criteria:
             value = getattr(self, name)
             if value is not None or getattr(type(self), name) is not None:
                 object.__setattr__(self, name, check_parameter(self, name, value))
-        if self.reliability is not None and not 0.0 < self.reliability < 1.0:
-            raise ParameterError(f"reliability = {self.reliability:g} is out of range; allowed: above 0, below 1")
+        if self.reliability is not None:
+            number("reliability", self.reliability, 0.0, 1.0, inside=True)
 
     def missing(self, what: str) -> tuple[str, ...]:
         """What is not stated of the criteria that one of ``NEEDS`` rests on."""
@@ -213,7 +214,7 @@ def _widened(tolerance: Tolerance, factor: int) -> Tolerance:
 
 
 @dataclass(frozen=True, kw_only=True)
-class Evaluation:
+class BearingEvaluation:
     """What forces mean for the bearing; NaN stands for what its criteria do not state.
 
     Attributes
@@ -250,13 +251,22 @@ class Evaluation:
     normal_reliability: float
     safety_factor: float
 
+    def as_dict(self) -> dict[str, Any]:
+        """Return plain values for JSON; an interval is a list of its ends, and None where nothing tells them."""
+
+        def ends(interval: Interval) -> list[float | None] | None:
+            return None if all(math.isnan(end) for end in interval) else plain(list(interval))
+
+        intervals = ("life_interval", "reliability_interval")
+        return {**plain(vars(self)), **{name: ends(getattr(self, name)) for name in intervals}}
+
     @property
     def tells_safety(self) -> bool:
         """Whether a safety factor follows from what is stated."""
         return not math.isnan(self.safety_factor)
 
 
-def evaluate(blocks: list[Array], criteria: Criteria, method: str, seed: int = 0) -> Evaluation:
+def evaluate(blocks: list[Array], criteria: Criteria, method: str, seed: int = 0) -> BearingEvaluation:
     """Evaluate life and reliability over peak forces (thesis 5.4.2).
 
     Parameters
@@ -279,7 +289,7 @@ def evaluate(blocks: list[Array], criteria: Criteria, method: str, seed: int = 0
     low, high = (scale * value ** (1.0 / exponent) for value in damage)
     rating, required = criteria.load_rating, criteria.life
     stressed = None if criteria._lacking(NEEDS["safety factor"][1:]) else _stressed(blocks, criteria, seed)
-    return Evaluation(
+    return BearingEvaluation(
         method=method,
         force=force,
         largest_force=largest,
@@ -320,15 +330,3 @@ def _stressed(blocks: list[Array], criteria: Criteria, seed: int) -> Mapping[str
         "reliability_interval": mean_interval(survival, criteria.confidence, seed),
         "normal_reliability": normal_reliability(mean, math.sqrt(square), *strength),
     }
-
-
-def plain(values: Mapping[str, Any]) -> dict[str, Any]:
-    """Replace numbers that are not finite by None, and tuples by lists; no number at all is no list either."""
-
-    def one(value: Any) -> Any:
-        if isinstance(value, tuple):
-            unknown = value and all(isinstance(each, float) and math.isnan(each) for each in value)
-            return None if unknown else [one(each) for each in value]
-        return None if isinstance(value, float) and not math.isfinite(value) else value
-
-    return {name: one(value) for name, value in values.items()}

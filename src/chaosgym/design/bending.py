@@ -10,21 +10,25 @@ E. Haibach, Betriebsfestigkeit, 3rd ed. (2006): Miner's rule with the line of Ba
 """
 
 import math
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike
 
+from chaosgym.arrays import Array
 from chaosgym.design.bearing import hours_of
-from chaosgym.design.bent_section import Bending, fibres, stress_of_modes
+from chaosgym.design.bent_section import Bending, fibres
 from chaosgym.design.fatigue import rainflow_means
 from chaosgym.design.runs import SettledRun
-from chaosgym.design.told import hours_told
+from chaosgym.design.texts import hours_text
+from chaosgym.machines import Machine
 from chaosgym.machines.parameters import parameters_of
-from chaosgym.simulation import parallel_map, simulate
+from chaosgym.plain import Result
+from chaosgym.simulation import simulate
 from chaosgym.simulation.modal_history import modal_history
+from chaosgym.simulation.parallel import parallel_map
 
 CYCLES = 32
 """Operating cycles of a settled response over which stresses are counted."""
@@ -101,7 +105,7 @@ def stressed(history: ArrayLike, cycles: int, bending: Bending, miss: float = 0.
 
 
 @dataclass(frozen=True)
-class BendingLife:
+class BendingLife(Result):
     """How long a section lasts.
 
     Attributes
@@ -113,6 +117,8 @@ class BendingLife:
     lives
         Life [10^6 operating cycles] of the nominal machine's section, then of each machine of the series.
     """
+
+    shows = "section=bending.section nominal lives assured"
 
     bending: Bending
     nominal: Stressed
@@ -131,7 +137,7 @@ class BendingLife:
     def told(self, cycle_period: float) -> list[str]:
         """Lines for people; the period of a cycle in s."""
         own, asked = self.nominal, self.bending
-        lives = (hours_told(hours_of(life, cycle_period)) for life in (self.lives[0], self.worst))
+        lives = (hours_text(hours_of(life, cycle_period)) for life in (self.lives[0], self.worst))
         lines = [
             f"bending {asked.section.told}: {1e-6 * own.lowest:.4g} to {1e-6 * own.highest:.4g} MPa, equivalent "
             f"amplitude {1e-6 * own.equivalent:.4g} MPa a cycle",
@@ -149,14 +155,8 @@ class BendingLife:
 
     def as_dict(self) -> dict[str, Any]:
         """Return plain values for JSON; None stands for a life without end."""
-        own = {name: value if math.isfinite(value) else None for name, value in self.nominal._asdict().items()}
-        return {
-            "section": {**self.bending.section._asdict(), "curvatures": list(self.bending.section.curvatures)},
-            "material": {name: getattr(self.bending, name) for name in parameters_of(self.bending)},
-            "nominal": own,
-            "lives": [life if math.isfinite(life) else None for life in self.lives],
-            "assured": self.assured if math.isfinite(self.assured) else None,
-        }
+        material = {name: getattr(self.bending, name) for name in parameters_of(self.bending)}
+        return {**super().as_dict(), "material": material}
 
 
 def bending_life(runs: Sequence[SettledRun], bending: Bending, *, workers: int | None = None) -> BendingLife:
@@ -191,27 +191,28 @@ def bending_life(runs: Sequence[SettledRun], bending: Bending, *, workers: int |
     return BendingLife(bending, found[0], tuple(one.life for one in found))
 
 
-def _of_link(run: SettledRun, bending: Bending) -> Stressed:
-    """Of a section of a mechanism's link, whose kernel shows the stress itself."""
-    found = []
-    for row in fibres(run.machine, bending):
-        shown = simulate(run.machine.showing(row), CYCLES, run.final_state, samples_per_cycle=SAMPLES).history
-        assert shown is not None
-        history = bending.notch_factor * shown[:, :, 0].ravel() + bending.static_stress
-        found.append(stressed(history, CYCLES, bending))
-    return min(found, key=lambda one: one.life)
-
-
 def _of_run(run: SettledRun, bending: Bending) -> Stressed:
-    if bending.section.link:
-        return _of_link(run, bending)
-    rows, samples = stress_of_modes(run.machine, bending), SAMPLES
+    part = run.machine.bending_parts.get(bending.section.link)
+    if part is not None and part.showing is not None:
+        return _of_link(run, bending, part.showing)
+    row, samples = fibres(run.machine, bending)[0], SAMPLES
     while True:
         record = simulate(run.machine, CYCLES, run.final_state, samples_per_cycle=samples)
-        modes = modal_history(record, rows)
+        modes = modal_history(record, row)
         if modes.miss <= MISS or samples >= MOST_SAMPLES:
             break
         samples *= 2
     bent = bending.notch_factor * modes.shown.ravel()
     both = [stressed(side * bent + bending.static_stress, CYCLES, bending, modes.miss) for side in (1.0, -1.0)]
     return min(both, key=lambda one: one.life)
+
+
+def _of_link(run: SettledRun, bending: Bending, showing: Callable[[Array], Machine]) -> Stressed:
+    """Of a section of a mechanism's link, whose kernel shows the stress itself."""
+    found = []
+    for row in fibres(run.machine, bending):
+        shown = simulate(showing(row), CYCLES, run.final_state, samples_per_cycle=SAMPLES).history
+        assert shown is not None
+        history = bending.notch_factor * shown[:, :, 0].ravel() + bending.static_stress
+        found.append(stressed(history, CYCLES, bending))
+    return min(found, key=lambda one: one.life)

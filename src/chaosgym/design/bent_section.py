@@ -25,6 +25,7 @@ from chaosgym.arrays import Array
 from chaosgym.errors import DesignError, ParameterError
 from chaosgym.machines import Machine
 from chaosgym.machines.parameters import parameter, validate
+from chaosgym.numbers import number
 
 MEANS = ("goodman", "gerber", "none")
 
@@ -117,8 +118,10 @@ class Bending:
             return np.where(left > 0.0, np.asarray(amplitude) / left, np.inf)
 
 
-def stress_of_modes(machine: Machine, bending: Bending) -> Array:
-    """Stress (n,) [Pa kg^-1/2 m^-1] at the upper fibre of a section for each mode, without notch.
+def fibres(machine: Machine, bending: Bending) -> Array:
+    """Stress (f, n) [Pa] at the outer fibres for each coordinate of a mechanism or each mode, without notch.
+
+    The mass-normalised modes of a machine make it [Pa kg^-1/2 m^-1].
 
     Raises
     ------
@@ -127,16 +130,23 @@ def stress_of_modes(machine: Machine, bending: Bending) -> Array:
 
     Examples
     --------
-    >>> from chaosgym.design.bent_section import Bending, Section, stress_of_modes
-    >>> stress_of_modes(chaosgym.ImpactBeam(), Bending(section=Section(at=0.1))).shape
-    (6,)
+    >>> from chaosgym.design.bent_section import Bending, Section, fibres
+    >>> upper, lower = fibres(chaosgym.ImpactBeam(), Bending(section=Section(at=0.1)))
+    >>> upper.shape, bool(np.all(upper == -lower))
+    ((6,), True)
     """
-    section = bending.section
+    section, parts = bending.section, machine.bending_parts
     if section.at is not None:
+        where = "bending" if section.link else "bending.at"
+        if section.link not in parts:
+            links = ", ".join(filter(None, parts)) or "a link with a [link.NAME.beam]"
+            own = f"{machine.name} has no beam of its own; allowed: impact-beam, or a link that bends"
+            none = f"link {section.link!r} does not bend; allowed: {links}" if section.link else own
+            raise ParameterError(f"{where}: {none}")
         try:
-            return machine.stress_at(section.at)
+            return parts[section.link].stress(section.at, bending.fibre)
         except ParameterError as error:
-            raise ParameterError(f"bending.at: {error}") from None
+            raise ParameterError(f"{where}: {error}") from None
     if machine.flexible is None:
         kind = "modes or matrices, of constant stiffness and without friction"
         raise ParameterError(f"[bending] is for a machine of {kind}; {machine.name} is none")
@@ -149,32 +159,8 @@ def stress_of_modes(machine: Machine, bending: Bending) -> Array:
     modes = len(machine.flexible.stiffness)
     if len(bent) != modes:
         raise ParameterError(f"bending.curvatures has {len(bent)} entries; allowed: {modes}, one a mode")
-    return -bending.modulus * bending.fibre * bent
-
-
-def fibres(machine: Machine, bending: Bending) -> Array:
-    """Stress (f, n) [Pa] at the outer fibres for each coordinate of a mechanism or each mode, without notch.
-
-    Raises
-    ------
-    ParameterError
-        If there is no such section on the machine.
-
-    Examples
-    --------
-    >>> from chaosgym.design.bent_section import Bending, Section, fibres
-    >>> upper, lower = fibres(chaosgym.ImpactBeam(), Bending(section=Section(at=0.1)))
-    >>> bool(np.all(upper == -lower))
-    True
-    """
-    section = bending.section
-    if section.link and section.at is not None:
-        try:
-            return machine.fibre_stress(section.link, section.at, bending.fibre)
-        except ParameterError as error:
-            raise ParameterError(f"bending: {error}") from None
-    row = stress_of_modes(machine, bending)
-    return np.stack([row, -row])
+    upper = -bending.modulus * bending.fibre * bent
+    return np.stack([upper, -upper])
 
 
 REQUIRED = ("amplitude", "cycles", "slope")
@@ -208,8 +194,9 @@ def read_bending(values: Mapping[str, Any], machine: Machine) -> Bending:
             f"[bending] has {' and '.join(kinds) or 'no section'}; allowed: one of at, turn (with span), curvatures"
         )
     on_link = "link" in given
-    if kinds == ["at"] and not on_link and machine.bending_links:
-        raise DesignError(f"[bending] lacks link, the one that bends; allowed: {', '.join(machine.bending_links)}")
+    links = ", ".join(filter(None, machine.bending_parts))
+    if kinds == ["at"] and not on_link and links:
+        raise DesignError(f"[bending] lacks link, the one that bends; allowed: {links}")
     if on_link and kinds != ["at"]:
         raise DesignError("[bending] has link, which goes with at, the place of the section on it")
     if given.get("mean_stress", "goodman") != "none" and "ultimate" not in given:
@@ -218,8 +205,7 @@ def read_bending(values: Mapping[str, Any], machine: Machine) -> Bending:
     for name in needed.get(kinds[0], ("fibre", "modulus")):
         if name not in given:
             raise DesignError(f"[bending] lacks {name}")
-        if not given[name] > 0.0:
-            raise ParameterError(f"bending.{name} = {given[name]:g} is out of range; allowed: above 0")
+        number(f"bending.{name}", given[name], 0.0, inside=True)
     goes_with = {"fibre": "turn, curvatures or link", "modulus": "turn or curvatures", "span": "turn"}
     for name in needed.get(kinds[0], ("fibre", "modulus")):
         goes_with.pop(name)

@@ -18,6 +18,7 @@ from chaosgym.design.brief_sections import (
     changes_of,
     costs_of,
     criteria_of,
+    heading_of,
     homes_of,
     impacts_of,
     machine_named,
@@ -35,7 +36,8 @@ from chaosgym.diagnosis import Tolerance, default_tolerances
 from chaosgym.errors import DesignError
 from chaosgym.files import toml_of
 from chaosgym.machines import FILE_ENDING, MACHINES, Machine
-from chaosgym.machines.parameters import parameters_of, with_settings
+from chaosgym.machines.accuracy import DEFAULT_TOLERANCE, ModelAccuracy, accuracy_of, is_tolerance, model_within
+from chaosgym.machines.parameters import expand_fidelity, is_half_play, parameters_of, with_settings
 from chaosgym.numbers import shown
 from chaosgym.units import parse_quantity
 
@@ -68,6 +70,10 @@ class DesignBrief:
         Clearances [m] at which the report says where impacts fall.
     bending_stated
         Names that its section on bending states.
+    heading
+        Texts at the head of the report, by "title", "project" and "author"; those that are stated.
+    accuracy
+        Estimated error of the machine's model, the largest of the nominal machine and of its farthest changes.
     """
 
     machine: Machine
@@ -81,6 +87,8 @@ class DesignBrief:
     bending: Bending | None = None
     impacts: tuple[float, ...] = ()
     bending_stated: tuple[str, ...] = field(default=())
+    heading: Mapping[str, str] = field(default_factory=dict)
+    accuracy: ModelAccuracy[Machine] | None = field(default=None)
 
 
 def brief_text(path: str | Path) -> tuple[str, bool]:
@@ -173,11 +181,14 @@ def brief_from(
         raise DesignError(f"region.wear = {shown(wear)} is out of range; allowed: true or false")
     criteria = criteria_of(values, machine, source, lines)
     tolerances = variation_region(machine, tolerances_of(values, machine), region.get("tolerances", 1), wear)
+    changes = changes_of(values, machine)
+    accuracy = _modelled(machine, values.get("fidelity"), settings, changes)
+    machine = accuracy.machine
     return DesignBrief(
         machine=machine,
         region=tolerances,
         criteria=criteria,
-        changes=changes_of(values, machine),
+        changes=changes,
         costs=costs_of(values, machine),
         series_size=series_size_of(values),
         duty={speed / nominal: share for speed, share in duty.items()},
@@ -185,7 +196,25 @@ def brief_from(
         bending=bending_of(values, machine, tolerances),
         impacts=impacts_of(values, machine),
         bending_stated=tuple(values.get("bending", {})),
+        heading=heading_of(values),
+        accuracy=accuracy,
     )
+
+
+def _modelled(
+    machine: Machine,
+    fidelity: Any,
+    settings: Mapping[str, Any],
+    changes: Mapping[str, tuple[float, ...]],
+) -> ModelAccuracy[Machine]:
+    """The machine by one model for all that it may become: as stated, or within a tolerance there."""
+    machine = with_settings(machine, expand_fidelity(machine, {**settings, "fidelity": fidelity}))
+    ends = {name: sorted({min(values), max(values)}) for name, values in changes.items() if values}
+    points = [machine, *(with_settings(machine, {name: end}) for name, pair in ends.items() for end in pair)]
+    stated = any(name in settings or name in changes for name in machine.model_fields)
+    if stated or (fidelity is not None and not is_tolerance(fidelity)):
+        return accuracy_of(machine, points)
+    return model_within(machine, fidelity or DEFAULT_TOLERANCE, points)
 
 
 def template(name: str) -> str:
@@ -201,10 +230,7 @@ def template(name: str) -> str:
     machine = machine_named(name)
     fields = parameters_of(machine)
     bends = "modes" if machine.flexible is not None else ""
-    if machine.bending_links:
-        bends = machine.bending_links[0]
-    if bends and type(machine).stress_at is not Machine.stress_at:
-        bends = "beam"
+    bends = next((name or "beam" for name in machine.bending_parts), bends)
 
     def written(field: str, value: float) -> str:
         unit = fields[field].unit
@@ -227,6 +253,8 @@ def template(name: str) -> str:
         speed=machine.speed_field,
         clearance=machine.clearance_field,
         gap=getattr(machine, machine.clearance_field),
+        measure="half the gap" if is_half_play(machine, machine.clearance_field) else "from rest to the stop",
+        rung=', or a rung such as "fine"' if "fine" in getattr(machine, "fidelity_ladder", {}) else "",
         slides=fields[machine.clearance_field].unit == "m",
         bends=bends,
         tolerances=default_tolerances(machine),

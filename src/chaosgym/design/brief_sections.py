@@ -14,7 +14,7 @@ from chaosgym.errors import DesignError
 from chaosgym.machines import MACHINES, Machine
 from chaosgym.machines.parameters import by_field, parameters_of, suggestion, with_settings
 from chaosgym.machines.stated import flat
-from chaosgym.numbers import shown
+from chaosgym.numbers import number, shown, whole
 from chaosgym.units import parse_quantity, parse_row, units_of
 
 BY_FIELD = ("parameters", "tolerances", "changes", "costs")
@@ -23,6 +23,7 @@ BY_FIELD = ("parameters", "tolerances", "changes", "costs")
 SECTIONS = (
     "machine",
     "series",
+    "fidelity",
     "parameters",
     "tolerances",
     "region",
@@ -33,7 +34,11 @@ SECTIONS = (
     "archard",
     "bending",
     "impacts",
+    "report",
 )
+
+HEADING = ("title", "project", "author")
+"""Texts at the head of a report."""
 
 DUTY = ("hours_a_day", "speeds")
 
@@ -70,6 +75,7 @@ def homes_of(machine: Machine | None = None) -> dict[str, str]:
     homes |= dict.fromkeys(set(parameters_of(Criteria)) - {"hours"}, "[criteria]") | {"wear": "[region]"}
     homes |= dict.fromkeys((*parameters_of(Bending), *OF_SECTION), "[bending]")
     homes |= dict.fromkeys(parameters_of(Wear), "[archard]")
+    homes |= dict.fromkeys(HEADING, "[report]")
     homes |= dict.fromkeys(DUTY, "[duty]") | dict.fromkeys(SECTIONS, "the brief itself, above or beside this section")
     return homes | dict.fromkeys(OF_MACHINE, 'the file of the machine, which the brief names: machine = "FILE.toml"')
 
@@ -84,6 +90,15 @@ def table_of(
     section: Mapping[str, Any] = by_field(machine, flat(given)) if machine and name in BY_FIELD else given
     refuse_unknown(f"[{name}]", section, known, homes_of(machine))
     return section
+
+
+def heading_of(values: Mapping[str, Any]) -> dict[str, str]:
+    """Texts at the head of the report: title, project and author, those that are stated."""
+    section = table_of(values, "report", HEADING)
+    for key, text in section.items():
+        if not isinstance(text, str) or not text.strip():
+            raise DesignError(f"report.{key} = {shown(text)} is no text; allowed: a text in quotes")
+    return {key: section[key].strip() for key in HEADING if key in section}
 
 
 def criteria_of(values: Mapping[str, Any], machine: Machine, source: str, lines: Mapping[str, int]) -> Criteria:
@@ -203,8 +218,7 @@ def _life(given: Any, hours_a_day: float) -> dict[str, float]:
     year = DAYS_A_YEAR * hours_a_day
     in_hours = {"h": 1.0, "years": year, "year": year, "days": hours_a_day, "day": hours_a_day}
     value = parse_quantity("criteria.life", given, "Mcycles", {**units_of("Mcycles"), **in_hours})
-    if not value > 0.0:
-        raise DesignError(f"criteria.life = {shown(given)} is out of range; allowed: above 0")
+    number("criteria.life", value, 0.0, unit="million cycles", inside=True, error=DesignError)
     return {"hours" if given.rpartition(" ")[2] in in_hours else "life": value}
 
 
@@ -217,8 +231,7 @@ def tolerances_of(values: Mapping[str, Any], machine: Machine) -> dict[str, Tole
     for key, given in table_of(values, "tolerances", fields, machine).items():
         relative = isinstance(given, str) and given.strip().endswith("%")
         value = parse_quantity(f"tolerances.{key}", given, "-" if relative else fields[key].unit)
-        if not value > 0.0:
-            raise DesignError(f"tolerances.{key} = {shown(given)} is out of range; allowed: above 0")
+        number(f"tolerances.{key}", value, 0.0, inside=True, error=DesignError)
         tolerances[key] = Tolerance(value, relative=relative)
     return tolerances
 
@@ -241,17 +254,12 @@ def costs_of(values: Mapping[str, Any], machine: Machine) -> dict[str, float]:
     """Cost weights by field."""
     changes = changes_of(values, machine)
     section = table_of(values, "costs", changes or parameters_of(machine), machine)
-    costs = {key: parse_quantity(f"costs.{key}", given, "-") for key, given in section.items()}
-    for key, cost in costs.items():
-        if not cost >= 0.0:
-            raise DesignError(f"costs.{key} = {cost:g} is out of range; allowed: 0 or more")
+    read = {f"costs.{key}": parse_quantity(f"costs.{key}", given, "-") for key, given in section.items()}
+    costs = {key.removeprefix("costs."): number(key, cost, 0.0, error=DesignError) for key, cost in read.items()}
     # an empty [changes] searches nothing: weights wait there for later
     return costs if changes else {}
 
 
 def series_size_of(values: Mapping[str, Any]) -> int:
     """Machines that represent the region."""
-    size = values.get("series", SERIES_SIZE)
-    if isinstance(size, bool) or not isinstance(size, int) or not 8 <= size <= 4096:
-        raise DesignError(f"series = {shown(size)} is out of range; allowed: whole numbers from 8 to 4096")
-    return size
+    return whole("series", values.get("series", SERIES_SIZE), 8, 4096, error=DesignError)

@@ -11,7 +11,7 @@ from collections.abc import Container, Iterable, Mapping
 from chaosgym.diagnosis import default_tolerances
 from chaosgym.errors import ParameterError
 from chaosgym.machines import Machine
-from chaosgym.machines.parameters import parameters_of, with_settings
+from chaosgym.machines.parameters import is_half_play, parameters_of, quantity_of, with_settings
 
 SECTION_FIELDS = ("height", "rod_diameter", "frequency_factor")
 """Fields that make a member stiffer."""
@@ -42,6 +42,29 @@ def default_changes(machine: Machine) -> dict[str, tuple[float, ...]]:
         name: tuple(_rounded(getattr(machine, name) * factor, 4) for factor in row if getattr(machine, name))
         for name, row in factors.items()
     }
+
+
+def value_text(machine: Machine, name: str) -> str:
+    """A changed value with its unit, and what it asks of a part where the field alone does not say.
+
+    Examples
+    --------
+    >>> value_text(chaosgym.ImpactBeam(height=0.012), "height")
+    '12 mm'
+    >>> value_text(chaosgym.ImpactBeam(clearance=1e-4), "clearance")
+    '0.1 mm (half of the play)'
+    """
+    value, told = getattr(machine, name), quantity_of(machine, name)
+    if is_half_play(machine, name):
+        return f"{told} (half of the play)"
+    asks = {
+        "frequency_factor": f"the structure {value**2:.3g} times as stiff, its mass as it is",
+        "damping_factor": f"{value:.3g} times the damping of the structure",
+        "lower_stiffness_factor": f"the lower stop {value:.3g} times as stiff as the upper one",
+        "lower_damping_factor": f"the lower stop with {value:.3g} times the damping of the upper one",
+        "drive_level": f"{value:.3g} times the force or motion of the drive",
+    }
+    return f"{told} ({asks[name]})" if name in asks else told
 
 
 def _of_contact(name: str, known: Container[str]) -> bool:

@@ -20,19 +20,11 @@ from typing import Any
 
 import numpy as np
 
-from chaosgym.design.bearing import Criteria, Evaluation, evaluate
+from chaosgym.design.bearing import BearingEvaluation, Criteria, evaluate
 from chaosgym.design.bending import BendingLife
+from chaosgym.design.checks import checks_of, enough, further_checks, safety_check, verdict_of
 from chaosgym.design.fatigue import equivalent_force, required_load_rating
-from chaosgym.design.methodology import (
-    Assessment,
-    AtSpeed,
-    assess,
-    checks_of,
-    enough,
-    further_checks,
-    safety_check,
-    verdict_of,
-)
+from chaosgym.design.methodology import Assessment, AtSpeed, assess
 from chaosgym.design.reliability import Interval
 from chaosgym.design.wear import WearLife, wear_over
 from chaosgym.diagnosis import Tolerance
@@ -101,7 +93,7 @@ def _over(nominal: Assessment, parts: tuple[AtSpeed, ...], seed: int) -> Assessm
     regular = [part.assessment for part in parts if part.assessment.type in ("I", "II")]
     checks = checks_of("III", evaluation, share, criteria)
     if regular:
-        checks += safety_check(min(one.evaluation.safety_factor for one in regular), criteria)
+        checks += safety_check(min(assessment.evaluation.safety_factor for assessment in regular), criteria)
     bent, worn = _bending(parts, cycles), _wear(nominal, parts)
     checks += further_checks(bent, worn, criteria, 1.0 / rate)
     kinds = [part.assessment.type for part in parts]
@@ -121,19 +113,19 @@ def _over(nominal: Assessment, parts: tuple[AtSpeed, ...], seed: int) -> Assessm
 
 def _bending(parts: Sequence[AtSpeed], cycles: Sequence[float]) -> BendingLife | None:
     """Life in bending over all speeds, of each machine; stresses are those of the nominal speed."""
-    found = [part.assessment.bending for part in parts]
-    own = next((one for one in found if one is not None), None)
+    bent = [part.assessment.bending for part in parts]
+    own = next((life for life in bent if life is not None), None)
     if own is None:
         return None
-    lives = zip(*(one.lives for one in found if one is not None), strict=True)
+    lives = zip(*(life.lives for life in bent if life is not None), strict=True)
     return replace(own, lives=tuple(miner(row, cycles) for row in lives))
 
 
 def _wear(nominal: Assessment, parts: Sequence[AtSpeed]) -> WearLife | None:
     """Course of the joint over all speeds, with nature and force of the nominal one."""
     nominal_first = sorted(parts, key=lambda part: part.assessment is not nominal)
-    found = [(part.assessment.wear, part.share) for part in nominal_first]
-    lives = [(life, share) for life, share in found if life is not None]
+    worn = [(part.assessment.wear, part.share) for part in nominal_first]
+    lives = [(life, share) for life, share in worn if life is not None]
     return wear_over(*zip(*lives, strict=True)) if lives else None
 
 
@@ -170,28 +162,28 @@ def damage_shares(parts: Sequence[AtSpeed]) -> list[float]:
         * (part.assessment.evaluation.force / (largest or 1.0)) ** part.assessment.criteria.life_exponent
         for part in parts
     ]
-    return [one / sum(done) if sum(done) else 0.0 for one in done]
+    return [damage / sum(done) if sum(done) else 0.0 for damage in done]
 
 
-def _evaluation(found: Sequence[Evaluation], cycles: Sequence[float], criteria: Criteria) -> Evaluation:
-    force = equivalent_force([one.force for one in found], criteria.life_exponent, np.array(cycles) / sum(cycles))
-    low, high = (miner([one.life_interval[end] for one in found], cycles) for end in (0, 1))
-    least = [min(one.reliability_interval[end] for one in found) for end in (0, 1)]
+def _evaluation(speeds: Sequence[BearingEvaluation], cycles: Sequence[float], criteria: Criteria) -> BearingEvaluation:
+    force = equivalent_force([part.force for part in speeds], criteria.life_exponent, np.array(cycles) / sum(cycles))
+    low, high = (miner([part.life_interval[end] for part in speeds], cycles) for end in (0, 1))
+    least = [min(part.reliability_interval[end] for part in speeds) for end in (0, 1)]
     required = criteria.life
-    return Evaluation(
-        method=f"Palmgren-Miner over {len(found)} speeds: each as its type asks for; reliability: the least of them",
+    return BearingEvaluation(
+        method=f"Palmgren-Miner over {len(speeds)} speeds: each as its type asks for; reliability: the least of them",
         force=force,
-        largest_force=max(one.largest_force for one in found),
-        life=miner([one.life for one in found], cycles),
+        largest_force=max(part.largest_force for part in speeds),
+        life=miner([part.life for part in speeds], cycles),
         life_interval=Interval(low, high),
-        conservative_life=miner([one.conservative_life for one in found], cycles),
+        conservative_life=miner([part.conservative_life for part in speeds], cycles),
         required_load_rating=math.nan
         if required is None
         else required_load_rating(force, required, criteria.life_exponent),
-        reliability=min(one.reliability for one in found),
+        reliability=min(part.reliability for part in speeds),
         reliability_interval=Interval(*least),
-        normal_reliability=min(one.normal_reliability for one in found),
-        safety_factor=min(one.safety_factor for one in found),
+        normal_reliability=min(part.normal_reliability for part in speeds),
+        safety_factor=min(part.safety_factor for part in speeds),
     )
 
 
@@ -204,6 +196,6 @@ def _share_that_meets(parts: Sequence[AtSpeed], cycles: Sequence[float], criteri
     verdicts = []
     for runs in rows:
         own = [evaluate([run.worse_side(exponent)], criteria, "", seed) for run in runs]
-        life = miner([one.life for one in own], cycles)
-        verdicts.append(enough(life, min(one.reliability for one in own), criteria))
+        life = miner([evaluation.life for evaluation in own], cycles)
+        verdicts.append(enough(life, min(evaluation.reliability for evaluation in own), criteria))
     return float(np.mean(verdicts))

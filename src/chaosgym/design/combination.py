@@ -10,6 +10,8 @@ The total index of a parameter is the share of the variance that it takes part i
 
     S_i = E[V(Y | all but x_i)] / V(Y)
 
+It is 1 at the most; an estimate from few machines may be above.
+
 Y is the largest peak force, or the logarithm of the life. Total indices add up to more than one where parameters act
 together, as they do in chaos.
 
@@ -36,8 +38,10 @@ from chaosgym.diagnosis import Neighbour, Tolerance
 from chaosgym.diagnosis.type_rule import FORCE_CHANGE
 from chaosgym.errors import SimulationError
 from chaosgym.machines import Machine
+from chaosgym.plain import Result, plain
 from chaosgym.series import Nature, Type
-from chaosgym.simulation import parallel_map, simulate
+from chaosgym.simulation import simulate
+from chaosgym.simulation.parallel import parallel_map
 
 BASE = 64
 """Machines of the base sample of total indices; each parameter adds as many, and two base samples are drawn."""
@@ -95,7 +99,7 @@ class Influence(NamedTuple):
 
 
 @dataclass(frozen=True)
-class Combination:
+class Combination(Result):
     """What tolerances do in combination.
 
     Attributes
@@ -114,6 +118,8 @@ class Combination:
         Machines that were run for the influences.
     """
 
+    shows = "types natures meeting machines_of_indices=sampled"
+
     types: Mapping[str, Probability]
     natures: Mapping[str, Probability]
     meeting: Probability | None
@@ -127,29 +133,25 @@ class Combination:
     @property
     def told(self) -> list[str]:
         """Lines for people."""
-        shares = [f"Type {kind} {_told(found)}" for kind, found in self.types.items() if found.share]
         meeting = "" if self.meeting is None else f"; of meeting what is required {_told(self.meeting)}"
-        lines = [f"probability of {', '.join(shares)}{meeting}"]
+        shares = sorted(((kind, one) for kind, one in self.types.items() if one.share), key=lambda pair: -pair[1].share)
+        told = ", ".join(f"Type {kind} {_told(one)}" for kind, one in shares)
+        all_of_them = self.types["III"].share == 1.0 and self.natures["periodic"].share > 0.0
+        why = "; the periodic ones too, since they lie among others" if all_of_them else ""
+        lines = [f"probability of a machine built within the tolerances: {told}{why}{meeting}"]
         for what, name in (("peak", "largest peak force"), ("life", "life")):
             first = self.most(what)
             if first is not None:
                 index: Probability = getattr(first, what)
                 share = f"total index {index.share:.2f}, {index.low:.2f} to {index.high:.2f}"
+                share += "; above 1 is the error of a small sample" if index.share > 1.0 else ""
                 lines.append(f"matters most for the {name}: {first.parameter.replace('_', ' ')} ({share})")
         return lines
 
     def as_dict(self) -> dict[str, Any]:
         """Return plain values for JSON."""
-        return {
-            "types": {kind: found._asdict() for kind, found in self.types.items()},
-            "natures": {nature: found._asdict() for nature, found in self.natures.items()},
-            "meeting": None if self.meeting is None else self.meeting._asdict(),
-            "total_indices": {
-                one.parameter: {"largest_peak": one.peak._asdict(), "life": one.life._asdict()}
-                for one in self.influences
-            },
-            "machines_of_indices": self.sampled,
-        }
+        indices = {one.parameter: {"largest_peak": one.peak, "life": one.life} for one in self.influences}
+        return {**super().as_dict(), "total_indices": plain(indices)}
 
 
 def _told(found: Probability) -> str:
@@ -192,7 +194,7 @@ def combination(
     further
         More machines of its tolerances, which tell the case of 5.5.1.
     base
-        Machines of the base sample of total indices, a power of 2.
+        Machines of the base sample of total indices, a power of 2; 0 for no indices.
     seed
         Of the sample and of the bootstrap.
     workers
@@ -283,7 +285,7 @@ def influences(
     ['clearance', 'length']
     """
     names = tuple(region)
-    if not names:
+    if not names or not base:
         return ()
 
     def forces(shares: Array) -> tuple[float, float]:

@@ -28,6 +28,7 @@ from numpy.typing import ArrayLike
 from chaosgym.arrays import Array
 from chaosgym.design.statistics import as_forces
 from chaosgym.errors import DesignError
+from chaosgym.numbers import number, whole
 from chaosgym.rating_life import LIFE_EXPONENT, damage_in_a_million
 
 CUBIC_EXPONENT = 3.0
@@ -35,9 +36,7 @@ CUBIC_EXPONENT = 3.0
 
 
 def _positive(name: str, value: float, unit: str) -> float:
-    if not (math.isfinite(value) and value > 0.0):
-        raise DesignError(f"{name} = {value:g}{unit} is out of range; allowed: above 0{unit}, finite")
-    return value
+    return number(name, value, 0.0, unit=unit.strip(), inside=True, error=DesignError)
 
 
 def rating_life(force: float, load_rating: float, exponent: float = LIFE_EXPONENT) -> float:
@@ -217,7 +216,6 @@ def equivalent_force_of_history(history: ArrayLike, cycles: int, exponent: float
     >>> round(equivalent_force_of_history([0.0, 20.0, 0.0, 10.0], cycles=1, exponent=3.0), 3)
     20.801
     """
-    if cycles < 1:
-        raise DesignError(f"cycles = {cycles} is out of range; allowed: 1 or more")
+    whole("cycles", cycles, 1, error=DesignError)
     ranges, counts = rainflow_cycles(history)
     return float((np.sum(counts * ranges**exponent) / cycles) ** (1.0 / exponent))

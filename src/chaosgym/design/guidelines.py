@@ -13,7 +13,7 @@ from collections.abc import Sequence
 from typing import Literal, NamedTuple
 
 from chaosgym.design.methodology import Assessment
-from chaosgym.design.told import listed
+from chaosgym.design.texts import listed
 from chaosgym.diagnosis import Neighbour, signs_of_chaos
 from chaosgym.diagnosis.precursors import measured_rates
 from chaosgym.diagnosis.type_rule import FORCE_CHANGE, mixed
@@ -33,7 +33,7 @@ CASES: dict[Case, str] = {
     "I": "every response in the tolerances is periodic",
     "II": "responses that are not periodic fill a part of the tolerances, and are of Type III",
     "II throughout": "no response in the tolerances is periodic, and all are of Type III",
-    "III": "periodic and other responses are mixed in the tolerances, and all are of Type III",
+    "III": "periodic and other responses are mixed in the tolerances, so that all are of Type III, the periodic too",
     "undetermined": "the nominal response is undetermined, so that no case is told",
 }
 
@@ -41,15 +41,15 @@ COEXISTING = "motions with forces more than 10 % apart coexist at the nominal ma
 """What the case becomes where an initial state decides."""
 
 EVALUATION: dict[Type, str] = {
-    "I": "the predicted trend, taken to the unfavourable corner of the tolerances, evaluates the machine",
-    "II": "the worst case found in the tolerances evaluates the machine",
-    "III": "statistics over all machines in the tolerances evaluate the machine",
+    "I": "the machine is judged by its predicted trend, taken to the unfavourable corner of the tolerances",
+    "II": "the machine is judged by the worst case found in the tolerances",
+    "III": "the machine is judged by statistics over all machines in the tolerances",
     "undetermined": "until the nominal response is told, statistics stand in and the verdict is open",
 }
 """Phase VI of 5.6, by type."""
 
 
-def case_of(found: Assessment, further: Sequence[Neighbour] = ()) -> Case:
+def case_of(assessed: Assessment, further: Sequence[Neighbour] = ()) -> Case:
     """Case of 5.5.1, over the machines of the series, the neighbourhood and those of ``further``.
 
     A machine that is undetermined is not known to be periodic, and counts as not periodic.
@@ -61,11 +61,11 @@ def case_of(found: Assessment, further: Sequence[Neighbour] = ()) -> Case:
     >>> case_of(assess(chaosgym.ImpactBeam(excitation_frequency=12.0), series_size=4))
     'I'
     """
-    nature = found.nominal.nature
+    nature = assessed.nominal.nature
     if nature == "undetermined":
         return "undetermined"
-    points = [*found.series.built, *further, *found.response.neighbours]
-    region = [({}, nature), *((one.shares, one.nature) for one in points)]
+    points = [*assessed.series.built, *further, *assessed.response.neighbours]
+    region = [({}, nature), *((machine.shares, machine.nature) for machine in points)]
     calm = [shares for shares, kind in region if kind == "periodic"]
     restless = [shares for shares, kind in region if kind != "periodic"]
     if not restless:
@@ -75,12 +75,12 @@ def case_of(found: Assessment, further: Sequence[Neighbour] = ()) -> Case:
     return "III" if mixed(restless, calm) else "II"
 
 
-def guidelines(found: Assessment, further: Sequence[Neighbour] = ()) -> tuple[Guideline, ...]:
+def guidelines(assessed: Assessment, further: Sequence[Neighbour] = ()) -> tuple[Guideline, ...]:
     """Sentences on one assessed machine, in the order of the thesis.
 
     Parameters
     ----------
-    found
+    assessed
         What the methodology says of it.
     further
         More machines of its tolerances, as for ``assess``.
@@ -99,43 +99,43 @@ def guidelines(found: Assessment, further: Sequence[Neighbour] = ()) -> tuple[Gu
     >>> [one.section for one in guidelines(found)][-2:]
     ['5.6, phase VI', '5.6, phase VII']
     """
-    said = [Guideline("5.3", sign.line) for sign in signs_of_chaos(found.response.centre)]
-    case = case_of(found, further)
-    machines = [*found.series.built, *further]
-    told = f"Case {case}: {CASES[case]}" if case != "undetermined" else CASES[case]
+    said = [Guideline("5.3", sign.line) for sign in signs_of_chaos(assessed.response.centre)]
+    case = case_of(assessed, further)
+    machines = [*assessed.series.built, *further]
+    sentence = CASES[case]
     if machines and case != "undetermined":
-        counts = Counter(one.nature for one in machines)
-        told += f" ({', '.join(f'{n} {nature}' for nature, n in counts.most_common())} of {len(machines)} machines)"
+        counts = Counter(machine.nature for machine in machines)
+        sentence += f" ({', '.join(f'{n} {nature}' for nature, n in counts.most_common())} of {len(machines)} machines)"
     if case != "undetermined":
-        told += _held(case, found)
-    said.append(Guideline("5.5.1", told))
-    if found.response.coexists:
+        sentence += _held(case, assessed)
+    said.append(Guideline("5.5.1", sentence))
+    if assessed.response.coexists:
         said.append(Guideline("5.5.1", COEXISTING))
     elif case == "I":
-        above = sum(one.largest_peak > (1.0 + FORCE_CHANGE) * found.nominal.largest_peak for one in machines)
-        some = f"(3): {len(machines) - above} are Type I and {above} Type II, 10 % of force above the nominal one"
-        outcome = "(1): all are Type I" if not above else "(2): all are Type II" if above == len(machines) else some
-        said.append(Guideline("5.5.1", f"outcome {outcome}"))
-    said.append(Guideline("5.6, phase VI", EVALUATION["II" if found.response.coexists else found.type]))
-    said.append(Guideline("5.6, phase VII", _next(found)))
+        above = sum(machine.largest_peak > (1.0 + FORCE_CHANGE) * assessed.nominal.largest_peak for machine in machines)
+        some = f"{len(machines) - above} are Type I and {above} Type II, with 10 % more force than the nominal one"
+        outcome = "all are Type I" if not above else "all are Type II" if above == len(machines) else some
+        said.append(Guideline("5.5.1", f"of the machines in the tolerances {outcome}"))
+    said.append(Guideline("5.6, phase VI", EVALUATION["II" if assessed.response.coexists else assessed.type]))
+    said.append(Guideline("5.6, phase VII", _next(assessed)))
     return tuple(said)
 
 
-def _held(case: Case, found: Assessment) -> str:
+def _held(case: Case, assessed: Assessment) -> str:
     """How often the case of its neighbours gave the right nature of a point of the dataset."""
-    rate = measured_rates().get(found.machine.name, {}).get(f"case {case}")
+    rate = measured_rates().get(assessed.machine.name, {}).get(f"case {case}")
     if rate is None or rate.precision is None:
-        return "; how often the case tells a machine's nature was not measured on this machine"
+        return ""
     what = "periodic" if case == "I" else "not periodic"
-    return f"; {rate.precision:.1%} of the dataset's points whose neighbours were of this case were {what} themselves"
+    return f"; {rate.precision:.1%} of the dataset's points whose neighbours do so were {what} themselves"
 
 
-def _next(found: Assessment) -> str:
-    if found.verdict == "meets":
+def _next(assessed: Assessment) -> str:
+    if assessed.verdict == "meets":
         return "the criteria are met: go on to the prototype stage, and measure there what was assumed"
-    if found.verdict == "not judged":
-        return "nothing is judged: state what the machine must reach, and go through phase VII then"
-    if found.verdict == "undetermined":
+    if assessed.verdict == "not judged":
+        return "nothing is judged: state in [criteria] what the machine must reach, and assess it again"
+    if assessed.verdict == "undetermined":
         return "the nominal response is undetermined: settle it by more cycles or by other nominal values, then go on"
-    missed = [check.name for check in found.checks if not check.met]
-    return f"{listed(missed)} missed: change the machine, and go through phases I to VI again"
+    missed = [check.name for check in assessed.checks if not check.met]
+    return f"{listed(missed)} missed: change the machine, and assess it again"

@@ -13,7 +13,7 @@ type, by force and by the life beside the present one; none is called sufficient
 
 import math
 from collections.abc import Iterable, Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from itertools import combinations
 from typing import Any, get_args
 
@@ -21,18 +21,27 @@ import numpy as np
 from tqdm import tqdm
 
 from chaosgym.arrays import Array
-from chaosgym.design.bearing import Evaluation, evaluate
-from chaosgym.design.changes import allowed, between, change_cost, default_changes, differing, distinct, part_of
+from chaosgym.design.bearing import BearingEvaluation, evaluate
+from chaosgym.design.changes import (
+    allowed,
+    between,
+    change_cost,
+    default_changes,
+    differing,
+    distinct,
+    part_of,
+)
+from chaosgym.design.checks import Check, enough
 from chaosgym.design.collective import assess_duty
-from chaosgym.design.fatigue import equivalent_force
-from chaosgym.design.methodology import SERIES_SIZE, Assessment, Check, enough
+from chaosgym.design.methodology import SERIES_SIZE, Assessment
 from chaosgym.design.runs import deviating, sobol_shares, worse_side
-from chaosgym.design.told import listed
+from chaosgym.design.trials import Improvement, Trial, force_of_machines, not_dominated
 from chaosgym.errors import DesignError, ParameterError, SimulationError
 from chaosgym.machines import Machine
-from chaosgym.machines.parameters import quantity_of, with_settings
+from chaosgym.machines.parameters import with_settings
 from chaosgym.series import Type
-from chaosgym.simulation import parallel_map, simulate
+from chaosgym.simulation import simulate
+from chaosgym.simulation.parallel import parallel_map
 
 SCREENED_MACHINES, SCREENED_CYCLES = 8, 60
 """Machines of the tolerances, and cycles before and while peaks are taken, that screen a candidate."""
@@ -48,140 +57,6 @@ SPARE = 3
 
 REFINEMENTS = 3
 """Bisections between the change that suffices and the nominal value."""
-
-
-@dataclass(frozen=True)
-class Trial:
-    """A changed machine and its assessment."""
-
-    changes: Mapping[str, float]
-    cost: float
-    assessment: Assessment
-    relative_life: float = math.nan
-    """Life in operation over that of the machine as it is: by ``force``, the exponent, and the cycle's time."""
-    force: float = math.nan
-    """Equivalent force over the machines built [N], whatever the type, so that changes compare like with like."""
-
-    @property
-    def meets(self) -> bool:
-        """Whether the changed machine meets the criteria."""
-        return self.assessment.verdict == "meets"
-
-    @property
-    def life(self) -> float:
-        """Life in required lives; in present ones where no life is judged."""
-        required = self.assessment.criteria.life
-        if required is None or not self.judges_life:
-            return self.relative_life
-        return self.assessment.evaluation.life_interval.low / required
-
-    @property
-    def judges_life(self) -> bool:
-        """Whether a life is required, and a load rating stated, by which it follows from the force."""
-        return not self.assessment.criteria.missing("life")
-
-    @property
-    def robustness(self) -> float:
-        """Share of the machines in the tolerances that reach life and reliability by their own statistics.
-
-        Where neither is required, the share of those that are periodic.
-        """
-        if self.assessment.criteria.judges_machines:
-            return self.assessment.machines_that_meet
-        runs = self.assessment.series.runs or (self.assessment.nominal,)
-        return sum(run.nature == "periodic" for run in runs) / len(runs)
-
-    @property
-    def compared(self) -> str:
-        """Type, force and life beside the machine as it is, for people."""
-        found, lasts = self.assessment, self.relative_life
-        life = f"life x{lasts:.3g} of the present one" if math.isfinite(lasts) else "no contact"
-        force = f"equivalent {self.force:.1f} N over the machines built"
-        return f"{self.told}: Type {found.type}, {force}, {life}, cost {self.cost:.2f}"
-
-    @property
-    def told(self) -> str:
-        """The changes with their units, for people: "excitation frequency 15 Hz"."""
-        machine = self.assessment.machine
-        return ", ".join(f"{name} = {quantity_of(machine, name)}" for name in self.changes)
-
-    def as_dict(self) -> dict[str, Any]:
-        """Return plain values for JSON."""
-        result = self.assessment.as_dict()
-        kept = ("verdict", "evaluation", "checks")
-        return {
-            "changes": dict(self.changes),
-            "cost": self.cost,
-            "type": self.assessment.type,
-            "life_in_required_lives": self.life if self.judges_life and math.isfinite(self.life) else None,
-            "force_of_machines_N": self.force,
-            "relative_life": self.relative_life if math.isfinite(self.relative_life) else None,
-            "robustness": self.robustness,
-            **{name: result[name] for name in kept},
-        }
-
-
-@dataclass(frozen=True)
-class Improvement:
-    """Outcome of a search.
-
-    Attributes
-    ----------
-    suggestions
-        Changes that were assessed, best first: those that meet the criteria by cost, then the others by how far they
-        miss. Where nothing is judged: by type, then by life.
-    best
-        The cheapest change found that meets the criteria; None if none does.
-    screened
-        Candidates that were screened besides.
-    """
-
-    suggestions: tuple[Trial, ...]
-    best: Trial | None
-    screened: int = 0
-
-    @property
-    def front(self) -> tuple[Trial, ...]:
-        """Trials that no other beats in cost, life and robustness at once, by cost."""
-        rows = [(-trial.cost, trial.life, trial.robustness) for trial in self.suggestions]
-        kept = [trial for trial, keep in zip(self.suggestions, not_dominated(rows), strict=True) if keep]
-        return tuple(sorted(kept, key=lambda trial: trial.cost))
-
-    @property
-    def told(self) -> str:
-        """What was found if nothing suffices, for people: the change that misses least, and what it misses."""
-        if not self.suggestions:
-            return "no change to try is stated"
-        nearest = self.suggestions[0]
-        if nearest.assessment.verdict == "not judged":
-            return (
-                f"changes, {len(self.suggestions)} assessed, are compared by type and force, since nothing is judged; "
-                f"first: {nearest.compared}"
-            )
-        missed = [f"{check.name} {check.told}" for check in nearest.assessment.checks if not check.met]
-        return (
-            f"none of {len(self.suggestions)} changes that were assessed meets all criteria; nearest: {nearest.told} "
-            f"with {listed(missed) or 'a nominal response that is undetermined'}"
-        )
-
-
-def not_dominated(rows: Sequence[Sequence[float]]) -> list[bool]:
-    """Whether no other row is as large in every column and larger in one; of equal rows the first stays.
-
-    Examples
-    --------
-    >>> not_dominated([(1.0, 2.0), (2.0, 1.0), (1.0, 1.0), (2.0, 1.0)])
-    [True, True, False, False]
-    """
-
-    def beaten(k: int) -> bool:
-        return any(
-            all(a >= b for a, b in zip(other, rows[k], strict=True)) and (tuple(other) != tuple(rows[k]) or j < k)
-            for j, other in enumerate(rows)
-            if j != k
-        )
-
-    return [not beaten(k) for k in range(len(rows))]
 
 
 def improve(
@@ -290,18 +165,6 @@ def improve(
     return Improvement(tuple(sorted(done, key=_rank)), best, len(candidates))
 
 
-def force_of_machines(found: Assessment) -> float:
-    """Equivalent force [N] over the machines built, each equally likely, and over the speeds of the duty."""
-    exponent, forces, rates = found.criteria.life_exponent, list[float](), list[float]()
-    for share, one in [(part.share, part.assessment) for part in found.collective] or [(1.0, found)]:
-        runs = (one.nominal, *one.series.runs)
-        forces.append(
-            equivalent_force([equivalent_force(run.worse_side(exponent), exponent) for run in runs], exponent)
-        )
-        rates.append(share / one.machine.cycle_period)
-    return equivalent_force(forces, exponent, np.array(rates) / sum(rates))
-
-
 def _lives(present: Assessment, changed: Assessment, after: float) -> float:
     """Life in operation of a changed machine, with its force [N], in lives of the present one."""
     before = force_of_machines(present)
@@ -353,17 +216,17 @@ def _screened(
     region, criteria, exponent = assessment.region, assessment.criteria, assessment.criteria.life_exponent
     shares = sobol_shares(len(region), SCREENED_MACHINES, seed) if region else np.zeros((1, 0))
 
-    def run(task: tuple[Mapping[str, float], Array]) -> Evaluation | None:
+    def run(task: tuple[Mapping[str, float], Array]) -> BearingEvaluation | None:
         try:
             machine = deviating(with_settings(assessment.machine, task[0]), region, task[1])
             peaks = simulate(machine, SCREENED_CYCLES, transient=SCREENED_CYCLES).peak_force
         except (SimulationError, ParameterError):
             return None
         own = criteria.at(machine.cycle_period) if criteria.hours else criteria
-        found = evaluate([worse_side(peaks, exponent)], own, "")
+        judged = evaluate([worse_side(peaks, exponent)], own, "")
         if own.life is None or own.missing("life"):
-            return replace(found, life=min((present / found.force) ** exponent if found.force else 1e6, 1e6))
-        return replace(found, life=min(found.life / own.life, 1e6))
+            return replace(judged, life=min((present / judged.force) ** exponent if judged.force else 1e6, 1e6))
+        return replace(judged, life=min(judged.life / own.life, 1e6))
 
     relative = criteria if criteria.life is None else replace(criteria, life=1.0, hours=None)
     tasks = [(one, row) for one in candidates for row in shares]

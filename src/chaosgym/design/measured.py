@@ -9,11 +9,12 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from chaosgym.arrays import Array
-from chaosgym.design.bearing import STRENGTH, Criteria, Evaluation, evaluate, plain
+from chaosgym.design.bearing import STRENGTH, BearingEvaluation, Criteria, evaluate
 from chaosgym.design.reliability import time_blocks
 from chaosgym.design.statistics import Convergence, Histogram, as_forces, convergence, histogram, require_enough
 from chaosgym.errors import DesignError
 from chaosgym.machines.parameters import quantity_of
+from chaosgym.plain import Result
 from chaosgym.recordings.judge import judge_peaks
 from chaosgym.recordings.measured_verdict import MeasuredVerdict
 from chaosgym.recordings.runs import Run
@@ -29,7 +30,7 @@ RANDOM_FOLLOWS = "the pattern repeats but for its scatter, so that the life foll
 
 
 @dataclass(frozen=True)
-class MeasuredPeaks:
+class MeasuredPeaks(Result):
     """Nature, statistics, life and reliability of measured peak forces.
 
     Attributes
@@ -50,12 +51,17 @@ class MeasuredPeaks:
         Where the peaks come from: "file", "sha256", "date" and the like.
     """
 
+    shows = (
+        "nature=verdict.diagnosis.nature period=verdict.diagnosis.period verdict stated_by=criteria.stated "
+        "cycles=convergence evaluation source"
+    )
+
     peaks: Array
     criteria: Criteria
     verdict: MeasuredVerdict
     convergence: Convergence
     histogram: Histogram
-    evaluation: Evaluation
+    evaluation: BearingEvaluation
     source: Mapping[str, str] = field(default_factory=lambda: MappingProxyType({}))
 
     @property
@@ -90,7 +96,7 @@ class MeasuredPeaks:
         found, asked = self.evaluation, self.criteria
         lines = [
             self.headline,
-            *(f"  {line}" for line in self.verdict.diagnosis.statement.lines()[1:]),
+            *(f"  {line}" for line in self.verdict.diagnosis.statement._replace(meaning="").lines()[1:]),
             *(f"  {note}" for note in self.verdict.notes),
             *([self.doubt] if self.doubt else []),
             self.life_line,
@@ -112,19 +118,13 @@ class MeasuredPeaks:
     def as_dict(self) -> dict[str, Any]:
         """Return plain values for JSON; None stands for what was not asked for."""
         return {
-            "nature": self.verdict.diagnosis.nature,
-            "period": self.verdict.diagnosis.period,
-            "verdict": self.verdict.as_dict(),
+            **super().as_dict(),
             "criteria": {name: getattr(self.criteria, name) for name in self.criteria.asked},
-            "stated_by": dict(self.criteria.stated),
-            "cycles": {**vars(self.convergence), "converged": self.convergence.converged},
             "estimate": self.doubt or None,
             "mean_N": float(np.mean(self.peaks)),
             "standard_deviation_N": float(np.std(self.peaks)),
             "largest_N": float(np.max(self.peaks)),
             "modes_N": self.histogram.modes.tolist(),
-            "evaluation": plain(vars(self.evaluation)),
-            "source": dict(self.source),
         }
 
 

@@ -21,52 +21,29 @@ machines must meet the criteria by their own statistics too, whatever the type.
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from typing import Any, Literal, NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 
-from chaosgym.design.bearing import Criteria, Evaluation, evaluate, hours_of, plain
+from chaosgym.design.bearing import BearingEvaluation, Criteria, evaluate
 from chaosgym.design.bending import BendingLife, bending_life
 from chaosgym.design.bent_section import Bending
+from chaosgym.design.checks import Check, Verdict, checks_of, enough, further_checks, verdict_of
 from chaosgym.design.fatigue import equivalent_force
 from chaosgym.design.reliability import time_blocks
-from chaosgym.design.runs import DIAGNOSIS_BUDGET, NOMINAL_BUDGET, Series, SettledRun, build_series, settled_run
+from chaosgym.design.runs import DIAGNOSIS_BUDGET, NOMINAL_BUDGET, MachineSeries, SettledRun, build_series, settled_run
 from chaosgym.design.statistics import Convergence, convergence
-from chaosgym.design.told import CRITERIA, listed
-from chaosgym.design.trend import Trend, fit_trend
+from chaosgym.design.texts import listed
+from chaosgym.design.trends import Trend, fit_trend
 from chaosgym.design.wear import Wear, WearLife, wear_life
 from chaosgym.diagnosis import Neighbour, ResponseType, Tolerance, default_tolerances, diagnose, response_type
 from chaosgym.machines import Machine
 from chaosgym.machines.parameters import parameters_of
+from chaosgym.plain import Result, plain
 from chaosgym.series import Type
-
-Verdict = Literal["meets", "fails", "undetermined", "not judged"]
 
 SERIES_SIZE = 32
 """Machines of the series that represents the region."""
-
-
-@dataclass(frozen=True)
-class Check:
-    """One criterion: what is required, what is reached, and whether that is enough."""
-
-    name: str
-    reached: float
-    required: float
-    unit: str
-    stated: str = ""
-    """Who stated what is required: "brief.toml:31", or the option of a command."""
-
-    @property
-    def met(self) -> bool:
-        """Whether the criterion is met."""
-        return self.reached >= self.required
-
-    @property
-    def told(self) -> str:
-        """What is reached of what is required, for people."""
-        reached, required = (CRITERIA[self.name](value) for value in (self.reached, self.required))
-        return f"{reached} of {required} {self.unit}".rstrip()
 
 
 class AtSpeed(NamedTuple):
@@ -78,7 +55,7 @@ class AtSpeed(NamedTuple):
 
 
 @dataclass(frozen=True, kw_only=True)
-class Assessment:
+class Assessment(Result):
     """The result of the methodology for one machine.
 
     Attributes
@@ -115,16 +92,21 @@ class Assessment:
         The speeds of a duty of several, whose evaluation, checks and verdict these are; empty for one speed.
     """
 
+    shows = (
+        "machine=machine.name stated_by=criteria.stated region verdict response cycles=convergence evaluation "
+        "nominal_evaluation checks not_judged bending wear"
+    )
+
     machine: Machine
     criteria: Criteria
     region: Mapping[str, Tolerance]
     response: ResponseType
     nominal: SettledRun
     convergence: Convergence
-    series: Series
+    series: MachineSeries
     trend: Trend
-    nominal_evaluation: Evaluation
-    evaluation: Evaluation
+    nominal_evaluation: BearingEvaluation
+    evaluation: BearingEvaluation
     checks: tuple[Check, ...]
     verdict: Verdict
     machines_that_meet: float
@@ -169,36 +151,21 @@ class Assessment:
 
     def as_dict(self) -> dict[str, Any]:
         """Return plain values for JSON; None stands for an infinite life, and for what is not asked."""
-        return {
-            "machine": self.machine.name,
+        runs, meeting = self.series.runs, self.machines_that_meet
+        nominal = {name: getattr(self.nominal, name) for name in ("nature", "period", "reason")}
+        own = {
             "parameters": {name: getattr(self.machine, name) for name in parameters_of(self.machine)},
             "criteria": {name: getattr(self.criteria, name) for name in parameters_of(self.criteria)},
-            "stated_by": dict(self.criteria.stated),
-            "region": {name: tolerance._asdict() for name, tolerance in self.region.items()},
-            "verdict": self.verdict,
-            "response": self.response.as_dict(),
-            "nominal": {
-                "nature": self.nominal.nature,
-                "period": self.nominal.period,
-                "reason": self.nominal.reason,
-                "cycles": len(self.nominal.peaks),
-                "largest_peak_N": self.nominal.largest_peak,
-            },
-            "cycles": {**vars(self.convergence), "converged": self.convergence.converged},
-            "evaluation": plain(vars(self.evaluation)),
-            "nominal_evaluation": plain(vars(self.nominal_evaluation)),
-            "checks": [plain({**vars(check), "met": check.met}) for check in self.checks],
-            "not_judged": self.not_judged,
-            "sensitivities": dict(zip(self.trend.parameters, self.trend.slopes.tolist(), strict=True)),
+            "nominal": {**nominal, "cycles": len(self.nominal.peaks), "largest_peak_N": self.nominal.largest_peak},
+            "sensitivities": dict(zip(self.trend.parameters, self.trend.slopes, strict=True)),
             "series": {
-                "machines": len(self.series.runs),
-                "share_that_meets": None if np.isnan(self.machines_that_meet) else self.machines_that_meet,
-                "largest_peak_N": [run.largest_peak for run in self.series.runs],
-                "nature": [run.nature for run in self.series.runs],
+                "machines": len(runs),
+                "share_that_meets": meeting,
+                "largest_peak_N": [run.largest_peak for run in runs],
+                "nature": [run.nature for run in runs],
             },
-            "bending": None if self.bending is None else self.bending.as_dict(),
-            "wear": None if self.wear is None else self.wear.as_dict(),
         }
+        return {**super().as_dict(), **plain(own)}
 
 
 def assess(
@@ -298,11 +265,11 @@ def _by_type(
     response: ResponseType,
     built: Sequence[Neighbour],
     nominal: SettledRun,
-    series: Series,
+    series: MachineSeries,
     trend: Trend,
     criteria: Criteria,
     seed: int,
-) -> Evaluation:
+) -> BearingEvaluation:
     exponent = criteria.life_exponent
     found = [one.largest_peak for one in built] + [point.largest_peak for point in response.neighbours]
     worst = float(np.nanmax([nominal.largest_peak, *found, *response.coexisting_peaks]))
@@ -321,59 +288,6 @@ def _by_type(
     if len(blocks) == 1:
         return evaluate(time_blocks(blocks[0]), criteria, "Type III: statistics of the nominal machine", seed)
     return evaluate(blocks, criteria, "Type III: statistics over all machines in the tolerances", seed)
-
-
-def checks_of(kind: Type, evaluation: Evaluation, share: float, criteria: Criteria) -> tuple[Check, ...]:
-    """Each criterion that is stated beside what is reached; the safety factor for Types I and II only."""
-    checks = []
-    if not criteria.missing("life"):
-        checks.append(_check("fatigue life", evaluation.life_interval.low, criteria, "life", "million cycles"))
-    if not criteria.missing("reliability"):
-        checks.append(_check("reliability", evaluation.reliability_interval.low, criteria, "reliability"))
-    if criteria.machines_that_meet is not None and criteria.judges_machines:
-        checks.append(_check("machines that meet", share, criteria, "machines_that_meet"))
-    if kind in ("I", "II"):
-        checks += safety_check(evaluation.safety_factor, criteria)
-    return tuple(checks)
-
-
-def safety_check(reached: float, criteria: Criteria) -> tuple[Check, ...]:
-    """The safety factor beside the one that is required; none if it is not asked for."""
-    return () if criteria.missing("safety factor") else (_check("safety factor", reached, criteria, "safety_factor"),)
-
-
-def _check(name: str, reached: float, criteria: Criteria, field: str, unit: str = "") -> Check:
-    return Check(name, reached, getattr(criteria, field), unit, criteria.origin(field))
-
-
-def further_checks(
-    bent: BendingLife | None, worn: WearLife | None, criteria: Criteria, cycle_period: float
-) -> tuple[Check, ...]:
-    """Lives of the flexible part and of a joint that wears, by a cycle's period [s], beside the one required."""
-    lives = dict[str, float]()
-    if bent is not None:
-        lives["bending life"] = bent.assured
-    if worn is not None:
-        lives["wear life"] = worn.assured / hours_of(1.0, cycle_period)
-    if criteria.life is None:
-        return ()
-    return tuple(_check(name, life, criteria, "life", "million cycles") for name, life in lives.items())
-
-
-def verdict_of(kind: Type, checks: tuple[Check, ...]) -> Verdict:
-    """Verdict of the checks: "fails" if one is missed, "undetermined" if the type is, else "meets"."""
-    if not checks:
-        return "not judged"
-    if not all(check.met for check in checks):
-        return "fails"
-    return "undetermined" if kind == "undetermined" else "meets"
-
-
-def enough(life: float, reliability: float, criteria: Criteria) -> bool:
-    """Whether a machine's own life [10^6 cycles] and reliability reach those that are required."""
-    lasts = bool(criteria.missing("life")) or (criteria.life is not None and life >= criteria.life)
-    endures = bool(criteria.missing("reliability")) or reliability >= (criteria.reliability or 0.0)
-    return lasts and endures
 
 
 def _share_that_meets(runs: tuple[SettledRun, ...], criteria: Criteria, seed: int) -> float:

@@ -29,6 +29,7 @@ from numpy.typing import ArrayLike
 
 from chaosgym.arrays import Array
 from chaosgym.errors import DesignError
+from chaosgym.numbers import number
 
 RESAMPLES = 2000
 """Bootstrap samples of an interval."""
@@ -158,8 +159,7 @@ def mean_interval(blocks: Sequence[ArrayLike], confidence: float = 0.95, seed: i
     >>> mean_interval([[1.0, 3.0]] * 10)
     Interval(low=2.0, high=2.0)
     """
-    if not 0.0 < confidence < 1.0:
-        raise DesignError(f"confidence = {confidence:g} is out of range; allowed: above 0, below 1")
+    number("confidence", confidence, 0.0, 1.0, inside=True, error=DesignError)
     means = np.array([np.mean(np.asarray(block)) for block in blocks])
     if np.ptp(means) == 0.0:
         return Interval(float(means[0]), float(means[0]))

@@ -15,7 +15,8 @@ from chaosgym.machines import Machine
 from chaosgym.machines.parameters import with_settings
 from chaosgym.rating_life import LIFE_EXPONENT
 from chaosgym.series import Nature
-from chaosgym.simulation import MotionState, parallel_map, rest_state, simulate
+from chaosgym.simulation import MotionState, rest_state, simulate
+from chaosgym.simulation.parallel import parallel_map
 
 SERIES_CYCLES = 200
 """Cycles recorded of a machine of a series whose response does not repeat."""
@@ -46,7 +47,7 @@ class SettledRun:
     Attributes
     ----------
     machine
-        What was run, from rest.
+        What was run.
     nature
         By the Two-Step Test.
     period
@@ -83,7 +84,7 @@ def settled_run(
     until_converged: bool = False,
     budget: int = DIAGNOSIS_BUDGET,
 ) -> SettledRun:
-    """Run a machine from rest until it has settled, and record its peak forces: a period, or ``SERIES_CYCLES``.
+    """Run a machine until it has settled, and record its peak forces: a period, or ``SERIES_CYCLES``.
 
     Parameters
     ----------
@@ -124,7 +125,7 @@ def settled_run(
 
 
 @dataclass(frozen=True)
-class Series:
+class MachineSeries:
     """Machines built to the tolerances.
 
     Attributes
@@ -145,8 +146,9 @@ class Series:
     def told(self) -> str:
         """How many of its machines are of each nature, for people."""
         counts = Counter(run.nature for run in self.runs).most_common()
-        natures = ", ".join(f"{n} {nature}" for nature, n in counts) or "none built"
-        return f"{natures} of {len(self.runs)} machines in the tolerances"
+        natures = ", ".join(f"{'all' if n == len(self.runs) else n} {nature}" for nature, n in counts) or "none"
+        begun = self.runs[0].machine.begins_from() if self.runs else "rest"
+        return f"{len(self.runs)} machines within the tolerances, each run from {begun}: {natures}"
 
     @property
     def built(self) -> tuple[Neighbour, ...]:
@@ -165,7 +167,7 @@ def build_series(
     seed: int = 0,
     workers: int | None = None,
     progress: bool = False,
-) -> Series:
+) -> MachineSeries:
     """Run machines whose parameters deviate together, spread evenly over the tolerances by a Sobol sequence.
 
     Parameters
@@ -190,11 +192,11 @@ def build_series(
     """
     names = tuple(tolerances)
     if not names or size == 0:
-        return Series(names, np.empty((0, len(names))), ())
+        return MachineSeries(names, np.empty((0, len(names))), ())
     shares = sobol_shares(len(names), size, seed)
     machines = [deviating(machine, tolerances, row) for row in shares]
     runs = parallel_map(settled_run, machines, workers=workers, progress="machines in tolerance" if progress else None)
-    return Series(names, shares, tuple(runs))
+    return MachineSeries(names, shares, tuple(runs))
 
 
 def sobol_shares(dimensions: int, size: int, seed: int) -> Array:

@@ -19,6 +19,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from chaosgym.arrays import Array
 from chaosgym.errors import DesignError
+from chaosgym.plain import Result
 
 MIN_CYCLES = 16
 """Fewest cycles of any statistic."""
@@ -97,7 +98,7 @@ def running_statistics(forces: ArrayLike) -> RunningStatistics:
 
 
 @dataclass(frozen=True)
-class Convergence:
+class Convergence(Result):
     """How long a record must be.
 
     Attributes
@@ -111,6 +112,8 @@ class Convergence:
     converged
         Whether ``cycles`` leaves half the record as proof, and the record is as long as ``needed``.
     """
+
+    shows = "cycles recorded needed converged"
 
     cycles: int
     recorded: int

@@ -12,6 +12,12 @@ from chaosgym.errors import ParameterError
 MAP_SHARES = np.arange(-4, 5) / 2.0
 """Points of the map along speed and clearance, in tolerances."""
 
+WITHIN = MAP_SHARES[np.abs(MAP_SHARES) <= 1.0]
+"""Those within the tolerances."""
+
+MAP_STARTS = 16
+"""Random starts that look for other motions at each point of the map; 48 do at the nominal machine."""
+
 MIDDLE = len(MAP_SHARES) // 2
 """Place of the nominal machine along each axis of the map."""
 
@@ -20,33 +26,44 @@ def in_tolerance(around: ResponseMap | None) -> tuple[Neighbour, ...]:
     """Machines of the map within the tolerances of speed and clearance, but for the nominal one."""
     if around is None:
         return ()
-    inside = np.flatnonzero(np.abs(MAP_SHARES) <= 1.0)
+    shares = MAP_SHARES if len(around.speed) == len(MAP_SHARES) else WITHIN
+    inside = np.flatnonzero(np.abs(shares) <= 1.0)
     fields = (around.machine.speed_field, around.machine.clearance_field)
     return tuple(
         Neighbour(
-            dict(zip(fields, (float(MAP_SHARES[i]), float(MAP_SHARES[j])), strict=True)),
+            dict(zip(fields, (float(shares[i]), float(shares[j])), strict=True)),
             str(around.nature[i, j]),
             float(np.nan_to_num(around.largest_peak[i, j])),
         )
         for i in inside
         for j in inside
-        if MAP_SHARES[i] or MAP_SHARES[j]
+        if shares[i] or shares[j]
     )
 
 
-def map_around(brief: DesignBrief, workers: int | None, progress: bool) -> ResponseMap | None:
-    """Types over speed and clearance; None where these do not vary or leave their range."""
+def map_around(brief: DesignBrief, workers: int | None, progress: bool, *, within: bool = False) -> ResponseMap | None:
+    """Types over speed and clearance; None where these do not vary or leave their range.
+
+    ``within`` leaves out machines beyond the tolerances: natures and forces within stay the same, types mean nothing.
+    """
     machine, region = brief.machine, brief.region
     for name in (machine.speed_field, machine.clearance_field):
         if name not in region or not (getattr(machine, name) or not region[name].relative):  # a share of zero is zero
             return None
     speeds, clearances = (
-        [region[name].at(getattr(machine, name), share) for share in MAP_SHARES]
+        [region[name].at(getattr(machine, name), share) for share in (WITHIN if within else MAP_SHARES)]
         for name in (machine.speed_field, machine.clearance_field)
     )
     try:
         return response_map(
-            machine, speeds, clearances, region, budget=DIAGNOSIS_BUDGET, workers=workers, progress=progress
+            machine,
+            speeds,
+            clearances,
+            {} if within else region,
+            initial_states=1 if within else MAP_STARTS,
+            budget=DIAGNOSIS_BUDGET,
+            workers=workers,
+            progress=progress,
         )
     except ParameterError:
         return None

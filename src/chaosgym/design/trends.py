@@ -1,11 +1,13 @@
-r"""Life against speed or clearance, over a whole range (thesis figure 5.12), and where impacts fall (5.4.1).
+r"""Trends: of the peak force over the tolerances (thesis 5.6), of life and of where impacts fall over a whole range.
 
-Life is relative to the first value of the range, by the cubic law: the statistical mean life (eq. 5.4), and what the
-largest and the smallest peak alone would suggest. Where the response is chaotic the two are far apart.
+Life against speed or clearance (figure 5.12) is relative to the first value of the range, by the cubic law: the
+statistical mean life (eq. 5.4), and what the largest and the smallest peak alone would suggest. Where the response is
+chaotic the two are far apart. Where impacts fall is the Peak Impact Diagram's question (5.4.1).
 
 A larger clearance lets peaks grow, and may spread them over more of the bearing; life counts the force alone.
 """
 
+import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import NamedTuple
@@ -20,8 +22,10 @@ from chaosgym.design.runs import SettledRun, settled_run, worse_side
 from chaosgym.errors import DesignError
 from chaosgym.machines import Machine
 from chaosgym.machines.parameters import quantity_of, with_settings
+from chaosgym.plain import Result
 from chaosgym.series import Nature
-from chaosgym.simulation import parallel_map, simulate
+from chaosgym.simulation import simulate
+from chaosgym.simulation.parallel import parallel_map
 
 HISTORY_SAMPLES = 2880
 """Samples a cycle of a time history: an eighth of a degree, and about ten samples an impact of the beam at 30 Hz."""
@@ -83,7 +87,7 @@ def impacts_against(
 
 
 @dataclass(frozen=True)
-class LifeTrend:
+class LifeTrend(Result):
     """Life along a range of one field.
 
     Attributes
@@ -101,6 +105,8 @@ class LifeTrend:
     largest_peak, mean_peak : (n,)
         [N].
     """
+
+    shows = "speed=values reference_speed=reference nature relative_life=statistical lowest highest"
 
     field: str
     values: Array
@@ -186,3 +192,60 @@ def life_against(
         np.array([float(np.mean(each)) for each in peaks]),
         float(chosen[int(touching[0])]),
     )
+
+
+@dataclass(frozen=True)
+class Trend:
+    """How the equivalent peak force follows the tolerances.
+
+    Attributes
+    ----------
+    parameters
+        Names of the toleranced fields.
+    slopes : (parameters,)
+        Change of log force for one tolerance.
+    unexplained
+        Standard deviation of log force over the series that the trend leaves.
+    """
+
+    parameters: tuple[str, ...]
+    slopes: Array
+    unexplained: float
+
+    @property
+    def worst_factor(self) -> float:
+        """Force in the unfavourable corner of the region, relative to nominal."""
+        return math.exp(float(np.sum(np.abs(self.slopes))))
+
+
+def fit_trend(parameters: tuple[str, ...], shares: Array, forces: Array, nominal: float) -> Trend:
+    """Fit the trend through the nominal force by least squares.
+
+    Parameters
+    ----------
+    parameters
+        Names of the columns of ``shares``.
+    shares : (machines, parameters)
+        Deviations from nominal in tolerances.
+    forces : (machines,)
+        Equivalent peak forces [N]; machines without contact are left out.
+    nominal
+        Force of the nominal machine [N].
+
+    Examples
+    --------
+    A clearance that is larger by a tolerance raises the force by 10 %:
+
+    >>> import numpy as np
+    >>> from chaosgym.design.trends import fit_trend
+    >>> shares = np.array([[-1.0], [0.0], [1.0]])
+    >>> trend = fit_trend(("clearance",), shares, 50.0 * 1.1 ** shares[:, 0], 50.0)
+    >>> trend.parameters, np.exp(trend.slopes).round(3).tolist()
+    (('clearance',), [1.1])
+    """
+    touching = forces > 0.0
+    if nominal == 0.0 or touching.sum() <= len(parameters):
+        return Trend(parameters, np.zeros(len(parameters)), 0.0)
+    logs = np.log(forces[touching] / nominal)
+    slopes = np.asarray(np.linalg.lstsq(shares[touching], logs)[0], dtype=float)
+    return Trend(parameters, slopes, float(np.std(logs - shares[touching] @ slopes)))

@@ -17,20 +17,23 @@ R. G. Budynas, J. K. Nisbett, Shigley's Mechanical Engineering Design, 10th ed.,
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 
 from chaosgym.arrays import Array
 from chaosgym.design.runs import DIAGNOSIS_BUDGET
-from chaosgym.design.told import hours_told, life_told
+from chaosgym.design.texts import hours_text, life_text
 from chaosgym.design.trends import HISTORY_SAMPLES
 from chaosgym.diagnosis import diagnose
-from chaosgym.errors import DesignError, ParameterError
+from chaosgym.errors import DesignError
 from chaosgym.machines import Machine
 from chaosgym.machines.parameters import parameter, parameters_of, validate, with_settings
+from chaosgym.numbers import number
+from chaosgym.plain import Result
 from chaosgym.series import Nature
-from chaosgym.simulation import MotionState, parallel_map, rest_state, simulate
+from chaosgym.simulation import MotionState, rest_state, simulate
+from chaosgym.simulation.parallel import parallel_map
 
 STEPS = 12
 """Steps of the clearance from nominal to the limit."""
@@ -100,7 +103,7 @@ class Worn(NamedTuple):
 
 
 @dataclass(frozen=True)
-class WearLife:
+class WearLife(Result):
     """How a joint wears.
 
     Attributes
@@ -110,6 +113,8 @@ class WearLife:
     course
         From the nominal clearance to the limit, in hours of operation; infinite beyond a clearance without contact.
     """
+
+    shows = "wear assured_hours=assured course"
 
     wear: Wear
     course: tuple[Worn, ...]
@@ -137,23 +142,13 @@ class WearLife:
             if not np.isfinite(hours):
                 return "never: a gap without contact does not wear"
             factor = self.wear.uncertainty
-            return f"{hours_told(hours)} ({life_told(hours / factor)} to {life_told(hours * factor)})"
+            return f"{hours_text(hours)} ({life_text(hours / factor)} to {life_text(hours * factor)})"
 
         lines = [f"wear to the limit of {1e3 * self.wear.limit:g} mm: {span(self.hours)}"]
         if self.change is not None:
             after = f"{self.change.nature} from {1e3 * self.change.clearance:.4g} mm on"
             lines.append(f"worn, the response is {after}, after {span(self.change.hours)}")
         return lines
-
-    def as_dict(self) -> dict[str, Any]:
-        """Return plain values for JSON; None stands for a time without end."""
-        return {
-            "wear": vars(self.wear),
-            "assured_hours": self.assured if np.isfinite(self.assured) else None,
-            "course": [
-                {**one._asdict(), "hours": one.hours if np.isfinite(one.hours) else None} for one in self.course
-            ],
-        }
 
 
 def worn_clearances(machine: Machine, wear: Wear) -> Array:
@@ -289,6 +284,5 @@ def read_wear(values: Mapping[str, float]) -> Wear:
     for name in ("limit", "sliding", "area"):
         if name not in values:
             raise DesignError(f"[archard] lacks {name}")
-        if not values[name] > 0.0:
-            raise ParameterError(f"archard.{name} = {values[name]:g} is out of range; allowed: above 0")
+        number(f"archard.{name}", values[name], 0.0, inside=True)
     return Wear(**values)

@@ -1,6 +1,8 @@
 """Verdicts on machines: nature with proof, Types I, II and III over the tolerances, signs of chaos."""
 
-from chaosgym.diagnosis.attractors import Attractor, Attractors, attractors
+from chaosgym.diagnosis.attractor import Attractor
+from chaosgym.diagnosis.attractors import Attractors, attractors
+from chaosgym.diagnosis.calm_region import CalmRegion, calm_region
 from chaosgym.diagnosis.diagnose import diagnose
 from chaosgym.diagnosis.lyapunov import largest_lyapunov_exponent, lyapunov_spectrum
 from chaosgym.diagnosis.matrix_update import compare_attractors, compare_outcomes, matrix_update_test
@@ -14,6 +16,7 @@ from chaosgym.diagnosis.verdict import MachineDiagnosis
 __all__ = [
     "Attractor",
     "Attractors",
+    "CalmRegion",
     "MachineDiagnosis",
     "Neighbour",
     "PeriodicOrbit",
@@ -22,6 +25,7 @@ __all__ = [
     "Tolerance",
     "attractors",
     "bounce_fraction",
+    "calm_region",
     "compare_attractors",
     "compare_outcomes",
     "default_tolerances",

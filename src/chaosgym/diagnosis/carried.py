@@ -1,6 +1,6 @@
 """States carried along the speed from below and from above, as a run-up and a run-down carry them."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 
 import numpy as np
@@ -65,17 +65,58 @@ def carried_states(machine: Machine, stops: Sequence[float] = ()) -> Carried:
     ):
         if end == own:
             continue
-        state = rest_state(machine)
-        try:
-            for speed in _on_the_way(end, own, passed):
-                state = simulate(machine.at(speed=speed), CYCLES, state).final_state
-                cycles += CYCLES
-                if speed in passed:
-                    beside.append((speed, state.coordinates))
-        except (ParameterError, SimulationError):
-            continue
-        here[f"{way} from {end:.4g} {unit}"] = state.coordinates
+        for speed, state in _along(machine, end, own, passed):
+            cycles += CYCLES
+            if speed == own:
+                here[f"{way} from {end:.4g} {unit}"] = state
+            elif speed in passed:
+                beside.append((speed, state))
     return Carried(here=here, beside=tuple(beside), cycles=cycles)
+
+
+def carried_over(machine: Machine, speeds: Sequence[float]) -> dict[float, dict[str, Array]]:
+    """Carry the state of rest up and down a row of speeds, from both ends of the usual range.
+
+    Parameters
+    ----------
+    machine
+        At any speed.
+    speeds
+        In the unit of the speed field, at least one.
+
+    Returns
+    -------
+    dict
+        By speed: states (n_states,) that arrive there, by name, as of ``Carried.here``.
+
+    Examples
+    --------
+    >>> from chaosgym.diagnosis.carried import carried_over
+    >>> [len(states) for states in carried_over(chaosgym.ImpactBeam(), [9.9, 10.0]).values()]
+    [2, 2]
+    """
+    name = machine.speed_field
+    unit, (low, high) = parameters_of(machine)[name].unit, machine.usual_ranges.get(name, (min(speeds), max(speeds)))
+    there: dict[float, dict[str, Array]] = {speed: {} for speed in speeds}
+    for way, end, order in (
+        ("run-up", min(low, *speeds), sorted(speeds)),
+        ("run-down", max(high, *speeds), sorted(speeds, reverse=True)),
+    ):
+        for speed, state in _along(machine, end, order[-1], order):
+            if speed in there:
+                there[speed][f"{way} from {end:.4g} {unit}"] = state
+    return there
+
+
+def _along(machine: Machine, end: float, own: float, passed: Sequence[float]) -> Iterator[tuple[float, Array]]:
+    """Speeds from an end of the range to another, and the state after some cycles at each; ends where a run fails."""
+    state = rest_state(machine)
+    try:
+        for speed in _on_the_way(end, own, passed):
+            state = simulate(machine.at(speed=speed), CYCLES, state).final_state
+            yield speed, state.coordinates
+    except (ParameterError, SimulationError):
+        return
 
 
 def _on_the_way(end: float, own: float, passed: Sequence[float]) -> list[float]:

@@ -5,7 +5,8 @@ periodic, certified. All others go on with a small deviation, whose growth gives
 cycles:
 
     it repeats, or nearly    Newton's method proves the orbit: periodic, certified. Where it can't (near grazing), a
-                             largest exponent below zero confirms the recurrence: periodic, agreed
+                             largest exponent below zero confirms the recurrence: periodic, agreed. An orbit with a
+                             multiplier of 1 is neutral: it closes, and neither attracts nor repels
     it does not              go on. At the end of the budget an exponent above three standard errors makes it chaotic,
                              one within them, with the figures of step II, quasiperiodic
     it never touches         the machine is linear there and the response can't be chaotic: it settles on the drive's
@@ -13,10 +14,11 @@ cycles:
 
 Tests that cost much run where they can change the verdict or its status: step II of the Two-Step Test, with the 0-1
 test, at the end of the last stage where the motion does not repeat, and the Matrix Update Test (flow chart of figure
-5.5), on machines whose matrices depend on their configuration, where no orbit is proven. Chaos that dies out within the
-horizon counts as chaotic (thesis 5.2.3), with the status "transient".
+5.5), on machines whose matrices depend on their configuration, where no orbit is proven. The nature is that of the
+settled motion; ``transient_chaos`` says how long the way there was chaotic.
 """
 
+import math
 from dataclasses import replace
 from typing import Any
 
@@ -32,10 +34,12 @@ from chaosgym.diagnosis.stage import Stage, not_periodic, periodic, periodic_wit
 from chaosgym.diagnosis.verdict import MachineDiagnosis, of_machine
 from chaosgym.errors import DiagnosisError
 from chaosgym.machines import Machine
+from chaosgym.numbers import number, whole
 from chaosgym.series.exponent import BLOCKS, average_growth
 from chaosgym.series.two_step import two_step_test
-from chaosgym.series.verdict import Diagnosis, Status
+from chaosgym.series.verdict import AT_REST, Diagnosis, Status
 from chaosgym.simulation import CycleRecord, ExactEvents, Integrator, MotionState, simulate
+from chaosgym.simulation.run import MOST_RECORDED
 
 EARLY = (16, 32)
 """Cycles after which a motion that repeats is handed to Newton's method, before the first stage.
@@ -53,6 +57,9 @@ DEFAULT_BUDGET = 3200
 
 UPDATE_CYCLES = 50
 """Cycles of each run of the Matrix Update Test, on machines whose matrices depend on configuration (figure 5.5)."""
+
+REST, REST_SAMPLES = 1e-9, 16
+"""Way that a joint moves in a cycle, relative to its displacement, up to which it is at rest; instants looked at."""
 
 MAX_SEARCHED_PERIOD = 128
 """Longest period that Newton's method is tried on where the motion contracts but does not repeat."""
@@ -96,7 +103,7 @@ def diagnose(
     Raises
     ------
     DiagnosisError
-        If the budget is below the first stage.
+        If the budget is below the first stage, or the sensor's error is negative or not finite.
     SimulationError
         If the motion can't be followed.
 
@@ -106,13 +113,27 @@ def diagnose(
     >>> verdict.words, verdict.status
     ('periodic, period 1', 'certified')
     >>> chaosgym.diagnose(chaosgym.ImpactBeam(excitation_frequency=30.0)).words
-    'chaotic'
+    'chaotic for at least 3200 cycles'
     """
     verdict = diagnose_alone(
         machine, initial_state=initial_state, budget=budget, sensor_error=sensor_error, integrator=integrator
     )
     decides = verdict.status == "agreed" and sensor_error == 0.0
     return _with_update_test(machine, verdict) if decides and depends_on_configuration(machine) else verdict
+
+
+def checked_run(budget: int, sensor_error: float) -> tuple[int, float]:
+    """Budget and sensor's error of a diagnosis.
+
+    Raises
+    ------
+    DiagnosisError
+        If the budget is below the first stage, or the error is negative or not finite.
+    """
+    return (
+        whole("budget", budget, FIRST_STAGE, MOST_RECORDED, error=DiagnosisError),
+        number("sensor_error", sensor_error, 0.0, unit="N", error=DiagnosisError),
+    )
 
 
 def diagnose_alone(
@@ -126,8 +147,7 @@ def diagnose_alone(
     """``diagnose`` without the vote of the Matrix Update Test, which judges a machine by other machines."""
     if initial_state is None and machine.initial_state:
         initial_state = machine.initial_state
-    if budget < FIRST_STAGE:
-        raise DiagnosisError(f"budget = {budget} cycles is out of range; allowed: {FIRST_STAGE} or more")
+    budget, sensor_error = checked_run(budget, sensor_error)
     exact = integrator is None or isinstance(integrator, ExactEvents)
     deviation = Deviation(machine, initial_state, integrator)
     stage, begun = _proven_early(machine, deviation, initial_state, integrator) if exact else (None, None)
@@ -138,11 +158,19 @@ def diagnose_alone(
     verdict = verdict or (without_contact(stage) if stage.linear else not_periodic(stage))
     evidence = _evidence(stage, verdict, initial_state)
     settled = None
-    if stage.orbit is not None and verdict.status == "certified":
+    if stage.orbit is not None:
         settled = _on_orbit(machine, stage.orbit)
         evidence["largest_peak"] = float(np.max(settled.peak_force))
+        if stage.orbit.neutral and _at_rest(machine, stage.orbit):
+            verdict = replace(verdict, manner=AT_REST)
     return of_machine(
-        verdict, votes=votes(stage), horizon=len(record), evidence=evidence, record=record, orbit_record=settled
+        verdict,
+        votes=votes(stage),
+        horizon=len(record),
+        evidence=evidence,
+        record=record,
+        orbit=stage.orbit,
+        orbit_record=settled,
     )
 
 
@@ -150,6 +178,14 @@ def _on_orbit(machine: Machine, orbit: PeriodicOrbit) -> CycleRecord:
     """Whole periods of a proven orbit, after one that tells which surface was touched last."""
     cycles = orbit.period * -(-ORBIT_CYCLES // orbit.period)
     return simulate(machine, cycles, orbit.state, transient=orbit.period)
+
+
+def _at_rest(machine: Machine, orbit: PeriodicOrbit) -> bool:
+    """True if a machine does not move on an orbit, beyond what rounding makes of its events."""
+    record = simulate(machine, 1, orbit.state, samples_per_cycle=REST_SAMPLES)
+    assert record.history is not None
+    gap, speed, _ = np.abs(record.history).max(axis=(0, 1))
+    return bool(speed * machine.cycle_period <= REST * gap)
 
 
 def _run_on(deviation: Deviation, begun: _Begun | None, cycles: int) -> _Begun:
@@ -184,7 +220,7 @@ def _proven_early(
         orbit, spent = proven_orbit(machine, record, verdict.period)
         searched += spent
         if orbit is not None:
-            per_cycle = np.full(2 * BLOCKS, np.log(max(orbit.largest_multiplier, 1e-300)) / orbit.period)
+            per_cycle = np.full(2 * BLOCKS, math.log(max(orbit.largest_multiplier, 1e-300)) / orbit.period)
             exponent = average_growth(per_cycle, machine.cycle_period)
             return Stage(record, per_cycle, verdict, exponent, orbit, len(record) + searched), begun
     return None, begun
@@ -228,7 +264,7 @@ def _stage(machine: Machine, record: CycleRecord, growth: Array, searched: int, 
     exponent = average_growth(growth[len(growth) // 2 :], machine.cycle_period, round_off)
     orbit, spent = None, 0
     if verdict.period is not None or exponent.sign < 0:
-        period = verdict.period or returning_period(record.section, MAX_SEARCHED_PERIOD)
+        period = verdict.period or returning_period(record.states, MAX_SEARCHED_PERIOD)
         orbit, spent = proven_orbit(machine, record, period)
     return Stage(record, growth, verdict, exponent, orbit, len(record) + searched + spent)
 
@@ -241,7 +277,7 @@ def _evidence(stage: Stage, verdict: Diagnosis, initial_state: MotionState | Arr
     if stage.orbit is not None:
         # exact for the orbit itself
         exponent |= {
-            "value": float(np.log(max(stage.orbit.largest_multiplier, 1e-300))) / stage.orbit.period,
+            "value": float(math.log(max(stage.orbit.largest_multiplier, 1e-300))) / stage.orbit.period,
             "standard_error": 0.0,
         }
         exponent["per_second"] = exponent["value"] / stage.exponent.cycle_period

@@ -2,7 +2,7 @@ r"""Lyapunov exponents, per cycle and per second: the rate at which neighbouring
 
     value = lim  1/N  log |w(N)| / |w(0)|         w: a small deviation of the state, N cycles
 
-On a machine that ``carries_deviations`` w is carried exactly, through contacts by saltation matrices. On any other a
+Where that is cheap w is carried exactly, through contacts by saltation matrices. Elsewhere a
 second trajectory starts at a small distance and is brought back to it each cycle (Benettin). ``series.exponent`` has
 the estimate from a measured series.
 
@@ -14,11 +14,15 @@ References
 G. Benettin, L. Galgani, A. Giorgilli, J.-M. Strelcyn, Meccanica 15 (1980) 9-30.
 """
 
+import math
+
 import numpy as np
 from numpy.typing import ArrayLike
 
 from chaosgym.arrays import Array
+from chaosgym.core import matrices
 from chaosgym.machines import Machine
+from chaosgym.machines.ignorable import ignorable, relative
 from chaosgym.machines.modal_impact import ModalImpactMachine
 from chaosgym.series.exponent import ROUND_OFF, LyapunovExponent, average_growth
 from chaosgym.simulation import (
@@ -31,6 +35,7 @@ from chaosgym.simulation import (
     simulate,
     simulate_with_deviations,
 )
+from chaosgym.simulation.record import joined
 
 DISTANCE = 1e-7
 """Distance of the second trajectory, relative to the size of the motion."""
@@ -40,7 +45,7 @@ ROUNDING = 1e-15
 
 
 def _any_direction(dimension: int) -> Array:
-    return np.asarray(np.cos(1.0 + np.arange(dimension)))
+    return np.asarray(matrices.cos(1.0 + np.arange(dimension)))
 
 
 class Deviation:
@@ -75,16 +80,20 @@ class Deviation:
     def exact(self) -> bool:
         """True where the deviation travels in the run of the motion; else it is a second trajectory."""
         exact = self._integrator is None or isinstance(self._integrator, ExactEvents)
-        return self._machine.carries_deviations and exact
+        return exact and not self._machine.moving.costly
 
     def run(self, cycles: int) -> tuple[CycleRecord, Array]:
         """Run on; return the record and the logarithm of the deviation's growth in each cycle, (cycles,)."""
+        if self.exact and cycles > 1 and ignorable(self._machine) is not None:
+            # what no force depends on would outgrow the rest of a deviation
+            runs = [self.run(1) for _ in range(cycles)]
+            return joined([record for record, _ in runs]), np.concatenate([growth for _, growth in runs])
         if self.exact:
             integrator = self._integrator if isinstance(self._integrator, ExactEvents) else None
             record, vectors, growth = simulate_with_deviations(
                 self._machine, cycles, self.state, deviations=self._direction, integrator=integrator
             )
-            self._direction, log_growth = vectors[0], growth[:, 0]
+            self._direction, log_growth = relative(self._machine, vectors[0]), growth[:, 0]
         else:
             record = simulate(self._machine, cycles, self.state, integrator=self._integrator)
             log_growth = self._second_trajectory(record)
@@ -99,12 +108,12 @@ class Deviation:
             self._direction = self._scale * self._direction
         log_growth = np.empty(len(record))
         for cycle in range(len(record)):
-            length = float(np.linalg.norm(self._direction / self._scale))
+            length = float(matrices.norm(self._direction / self._scale))
             start = states[cycle] + DISTANCE / length * self._direction
             end = simulate(self._machine, 1, start, integrator=self._integrator).final_state.coordinates
-            self._direction = end - states[cycle + 1]
-            distance = float(np.linalg.norm(self._direction / self._scale))
-            log_growth[cycle] = np.log(max(distance, ROUNDING) / DISTANCE)
+            self._direction = relative(self._machine, end - states[cycle + 1])
+            distance = float(matrices.norm(self._direction / self._scale))
+            log_growth[cycle] = math.log(max(distance, ROUNDING) / DISTANCE)
             if distance < ROUNDING:
                 self._direction = self._scale * _any_direction(len(self._scale))
         return log_growth

@@ -3,36 +3,47 @@ r"""Proof of a periodic response: Newton's method on the map of k cycles, and it
     y <- y - (M - I)^-1 (P(y) - y)         P: the motion over k cycles, M = dP/dy
 
 An orbit is certified if |P(y) - y| falls below 1e-10 of the orbit's size and every eigenvalue of M lies inside the
-unit circle. Newton's method, like M itself, fails near grazing, where P is not smooth.
+unit circle, by more than rounding. Newton's method, like M itself, fails near grazing, where P is not smooth.
+
+Where M costs many runs, as of a worn pin, Broyden's method goes on from each.
 """
 
 import math
 from dataclasses import dataclass, field
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from chaosgym.arrays import Array
-from chaosgym.core import status
+from chaosgym.core import matrices, status
 from chaosgym.core.cycle import CycleArrays
 from chaosgym.core.tangent import Tangents
+from chaosgym.diagnosis.broyden import root_near
 from chaosgym.errors import SimulationError
 from chaosgym.machines import Machine
+from chaosgym.machines.ignorable import relative
+from chaosgym.plain import Result
 from chaosgym.simulation import ExactEvents, MotionState
 
 RESIDUAL = 1e-10
 """Largest miss of a certified orbit, relative to its size."""
 
+CLOSES_WELL = 1e-3 * RESIDUAL
+"""Miss at which no further step is worth its runs."""
+
 PRECISE = ExactEvents(event_tolerance=1e-13)
 """Events to rounding error, so that the miss can fall below the limit."""
+
+NEUTRAL = 1e-6
+"""How near 1 the largest multiplier of a neutral orbit is: deviations neither grow nor decay, beyond all rounding."""
 
 FINITE_DIFFERENCE = 1e-6
 """Step of the derivative where no exact deviations exist, relative to the size of the coordinate."""
 
 
 @dataclass(frozen=True, kw_only=True)
-class PeriodicOrbit:
+class PeriodicOrbit(Result):
     """A fixed point of the map of ``period`` cycles.
 
     Attributes
@@ -51,6 +62,8 @@ class PeriodicOrbit:
         How far the search moved, relative to the size.
     """
 
+    shows = "period residual largest_multiplier distance certified"
+
     period: int
     state: Array = field(repr=False)
     residual: float
@@ -66,17 +79,22 @@ class PeriodicOrbit:
     @property
     def certified(self) -> bool:
         """True if the orbit closes and attracts."""
-        return self.residual < RESIDUAL and self.largest_multiplier < 1.0
+        return self.closes and self.largest_multiplier < 1.0 - NEUTRAL
 
-    def as_dict(self) -> dict[str, Any]:
-        """Return plain values for JSON."""
-        return {
-            "period": self.period,
-            "residual": self.residual,
-            "largest_multiplier": self.largest_multiplier,
-            "distance": self.distance,
-            "certified": self.certified,
-        }
+    @property
+    def neutral(self) -> bool:
+        """True if the orbit closes, and deviations neither grow nor decay: one of a family that lie side by side."""
+        return self.closes and abs(self.largest_multiplier - 1.0) <= NEUTRAL
+
+    @property
+    def proven(self) -> bool:
+        """True if the orbit closes and does not repel."""
+        return self.certified or self.neutral
+
+    @property
+    def closes(self) -> bool:
+        """True if the orbit closes."""
+        return self.residual < RESIDUAL
 
 
 def find_periodic_orbit(
@@ -108,7 +126,8 @@ def find_periodic_orbit(
     >>> orbit.certified, round(orbit.largest_multiplier, 4)
     (True, 0.2282)
     """
-    origin = np.array(start.coordinates if isinstance(start, MotionState) else start, dtype=float)
+    given = start.coordinates if isinstance(start, MotionState) else start
+    origin = relative(machine, np.array(given, dtype=float))
     state = origin.copy()
     weight = machine.state_weights(origin)
     best: tuple[float, Array, Array] | None = None
@@ -120,29 +139,43 @@ def find_periodic_orbit(
             if best is not None and residual >= best[0]:
                 break
             best = (residual, state, monodromy)
-            if residual < 1e-3 * RESIDUAL:
+            if residual < CLOSES_WELL:
                 break
-            state = state - np.linalg.solve(monodromy - np.eye(len(state)), end - state)
+            step = matrices.solve(monodromy - np.eye(len(state)), end - state)
+            if not machine.moving.costly:
+                state = state - step
+            else:
+                state = _neared(machine, state - step, period, monodromy, weight)
     except (SimulationError, np.linalg.LinAlgError):
         pass
     if best is None:
         return None
     residual, state, monodromy = best
-    multipliers = np.linalg.eigvals(monodromy)
+    multipliers = matrices.eigvals(monodromy)
     return PeriodicOrbit(
         period=period,
         state=state,
         residual=residual,
-        multipliers=np.asarray(multipliers[np.argsort(-np.abs(multipliers))], dtype=complex),
+        multipliers=np.asarray(multipliers[np.argsort(-matrices.modulus(multipliers), kind="stable")], dtype=complex),
         derivative=monodromy,
         distance=_share(weight * (state - origin), weight * origin),
     )
 
 
+def _neared(machine: Machine, state: Array, period: int, monodromy: Array, weight: Array) -> Array:
+    """A state (n_states,) nearer to an orbit by Broyden's method, from the derivative of the map nearby."""
+    derivative = monodromy * weight[:, None] / weight - np.eye(len(weight))
+    closed = CLOSES_WELL * float(matrices.norm(weight * state))
+    root = root_near(
+        lambda z: weight * run_period(machine, z / weight, period).end - z, weight * state, derivative, closed
+    )
+    return root.x / weight
+
+
 def _share(change: Array, whole: Array) -> float:
     """Size of a change as a share of the whole: 0 where nothing changes, also of a machine at rest."""
-    size = float(np.linalg.norm(change))
-    return size / float(np.linalg.norm(whole)) if np.any(whole) else math.inf if size else 0.0
+    size = float(matrices.norm(change))
+    return size / float(matrices.norm(whole)) if np.any(whole) else math.inf if size else 0.0
 
 
 class Period(NamedTuple):
@@ -153,7 +186,7 @@ class Period(NamedTuple):
 
 
 def run_period(machine: Machine, state: Array, period: int, tangents: Tangents | None = None) -> Period:
-    """Run over one period from a state; ``tangents`` travel along.
+    """Run over one period from a state; ``tangents`` travel along. Both are told less what no force depends on.
 
     It is ``simulate`` without what a few cycles do not need: slices for Ctrl-C, and a record.
 
@@ -169,7 +202,9 @@ def run_period(machine: Machine, state: Array, period: int, tangents: Tangents |
     outcome, _ = machine.run(coordinates, bouncing, arrays, PRECISE, tangents)
     if outcome != status.OK:
         raise SimulationError(f"{status.MESSAGES[outcome]}; it can't be followed over {period} cycles")
-    return Period(coordinates, arrays)
+    if tangents is not None:
+        tangents.vectors[:] = relative(machine, tangents.vectors)
+    return Period(relative(machine, coordinates), arrays)
 
 
 def period_map(machine: Machine, state: Array, period: int, weight: Array) -> tuple[Period, Array]:
@@ -177,7 +212,7 @@ def period_map(machine: Machine, state: Array, period: int, weight: Array) -> tu
 
     ``weight`` (n_states,) scales the differences that stand for the derivative where no exact deviations exist.
     """
-    if machine.carries_deviations:
+    if machine.moving.deviations:
         along = Tangents(np.eye(len(state)), np.empty((period, 0)))
         run = run_period(machine, state, period, along)
         return run, np.ascontiguousarray(along.vectors.T)

@@ -13,16 +13,17 @@ anew.
 
 import json
 from collections.abc import Mapping
-from dataclasses import asdict, dataclass
+from dataclasses import dataclass
 from functools import cache
 from importlib import resources
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 
 from chaosgym.diagnosis.verdict import MachineDiagnosis
 from chaosgym.errors import DiagnosisError
 from chaosgym.machines import Machine
+from chaosgym.plain import Result
 from chaosgym.simulation import CycleRecord
 
 
@@ -127,7 +128,7 @@ def measured_rates() -> Mapping[str, Mapping[str, Rate]]:
 
 
 @dataclass(frozen=True)
-class Sign:
+class Sign(Result):
     """One sign of chaos on one response.
 
     Attributes
@@ -151,17 +152,14 @@ class Sign:
     def line(self) -> str:
         """The sign in one line, with its precision where it is there, and with its recall where it is not."""
         printed = self.name == "criteria"
-        told = f"{self.name} ({'5.3.1' if printed else '5.3.2'}): {'yes' if self.present else 'no'}, {self.why}"
+        name = "thresholds of chaos" if printed else f"sign of chaos, {self.name}"
+        told = f"{name}: {'yes' if self.present else 'no'}, {self.why}"
         if self.rate is None:
-            return f"{told}; how often it is right was not measured on this machine" if self.present else told
+            return f"{told}; how often that is right was not measured on this machine" if self.present else told
         chaos = "chaos" if printed else "chaos within the tolerances of speed and clearance"
         if self.present:
-            return f"{told}; {_share(self.rate.precision)} of the dataset's points with it had {chaos}"
-        return f"{told}; {_share(self.rate.recall)} of the dataset's points with {chaos} had it"
-
-    def as_dict(self) -> dict[str, Any]:
-        """Return plain values for JSON."""
-        return {**asdict(self), "rate": self.rate._asdict() if self.rate else None}
+            return f"{told}; {_share(self.rate.precision)} of the dataset's points with this sign had {chaos}"
+        return f"{told}; {_share(self.rate.recall)} of the dataset's points with {chaos} had this sign"
 
 
 def _share(share: float | None) -> str:
@@ -205,7 +203,8 @@ def signs_of_chaos(verdict: MachineDiagnosis) -> tuple[Sign, ...]:
         return tuple(found)
     early = precursors(verdict.period, bounce_fraction(verdict.judged))
     period = f"period {verdict.period}"
-    bouncing = f"bounces for {early.bounce_fraction:.0%} of a half cycle"
+    cycles = early.bounce_fraction / 2.0
+    bouncing = f"bounces for {cycles:.2g} cycles before it stays in contact" if cycles else "no bouncing into contact"
     for name, present, why in (
         ("period doubling", early.period_doubling, period),
         ("period three", early.period_three, period),

@@ -1,6 +1,6 @@
 """Response types over speed and clearance."""
 
-from collections.abc import Mapping
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -8,29 +8,33 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from chaosgym.arrays import Array
-from chaosgym.diagnosis.diagnose import diagnose
+from chaosgym.diagnosis.attractors import attractors
+from chaosgym.diagnosis.calm_region import CalmRegion, calm_region, searched_by
+from chaosgym.diagnosis.carried import carried_over
+from chaosgym.diagnosis.diagnose import checked_run, diagnose
 from chaosgym.diagnosis.response_type import (
+    FEWEST_STARTS,
     Tolerance,
     check_initial_states,
     chosen_tolerances,
     coexisting,
     define,
-    motions_beside,
     region_points,
 )
-from chaosgym.diagnosis.type_rule import Coexisting, Neighbour, judge_type
+from chaosgym.diagnosis.type_rule import UNSETTLED, Coexisting, Neighbour, judge_type
 from chaosgym.diagnosis.verdict import MachineDiagnosis
 from chaosgym.errors import DiagnosisError, SimulationError
 from chaosgym.machines import Machine
 from chaosgym.machines.parameters import with_settings
-from chaosgym.simulation import parallel_map
+from chaosgym.plain import Result
+from chaosgym.simulation.parallel import parallel_map
 
 Place = tuple[float, float]
 """Speed and clearance."""
 
 
 @dataclass(frozen=True, kw_only=True)
-class ResponseMap:
+class ResponseMap(Result):
     """Types over speed and clearance.
 
     Attributes
@@ -51,6 +55,8 @@ class ResponseMap:
         Window, statistic and initial states.
     """
 
+    shows = "speed clearance type largest_peak calm"
+
     machine: Machine
     speed: Array
     clearance: Array
@@ -59,6 +65,13 @@ class ResponseMap:
     largest_peak: Array
     runs: int
     definition: Mapping[str, Any]
+
+    @property
+    def calm(self) -> CalmRegion:
+        """Where the map is of Type I: the largest clearance for all its speeds, and calm speeds."""
+        searched = searched_by(self.machine, self.definition["initial_states"])
+        settled = "`chaosgym diagnose` with a larger --budget there"
+        return calm_region(self.machine, self.speed, self.clearance, self.type, searched, settled)
 
 
 def geometric_grid(low: float, high: float, tolerance: Tolerance, points_per_tolerance: int = 2) -> Array:
@@ -102,7 +115,8 @@ def response_map(
     speeds, clearances : (n_speeds,), (n_clearances,)
         In the fields' units.
     tolerances, initial_states, budget, sensor_error, workers
-        As for ``response_type``. One initial state by default: more can't be shared.
+        As for ``response_type``. One initial state by default: more can't be shared. Of 16 or more, states are carried
+        along all speeds of a clearance at once, and a neighbour counts by its motion of the largest force.
     progress
         Show a progress bar on standard error.
 
@@ -116,6 +130,7 @@ def response_map(
     """
     allowed = chosen_tolerances(machine, tolerances, "speed-clearance")
     check_initial_states(initial_states)
+    budget, sensor_error = checked_run(budget, sensor_error)
     speed, clearance = np.asarray(speeds, dtype=float), np.asarray(clearances, dtype=float)
     fields = (machine.speed_field, machine.clearance_field)
     shape = (len(speed), len(clearance))
@@ -135,6 +150,7 @@ def response_map(
 
     verdicts = parallel_map(judge, places, workers=workers, progress="map" if progress else None)
     runs = dict(zip(places, verdicts, strict=True))
+    others = _others(at_place, centres.values(), runs, initial_states, budget, workers)
     types, natures = np.full(shape, "undetermined"), np.full(shape, "undetermined")
     peaks = np.full(shape, np.nan)
     for at, place in centres.items():
@@ -142,12 +158,10 @@ def response_map(
         if centre is None:
             continue
         natures[at], peaks[at] = centre.nature, centre.evidence["largest_peak"]
-        others: tuple[Coexisting, ...] = ()
-        if initial_states > 1 and centre.nature == "periodic":
-            found, _ = motions_beside(at_place(place), centre, initial_states, budget, workers)
-            others = coexisting(found, centre)
-        neighbours = [_neighbour(one, runs[near]) for one, near in zip(points, around[at], strict=True)]
-        types[at] = judge_type(centre.nature, float(peaks[at]), neighbours, others)[0]
+        neighbours = [
+            _neighbour(one, runs[near], others.get(near, ())) for one, near in zip(points, around[at], strict=True)
+        ]
+        types[at] = judge_type(centre.nature, float(peaks[at]), neighbours, others.get(place, ()))[0]
     return ResponseMap(
         machine=machine,
         speed=speed,
@@ -176,7 +190,42 @@ def _moved(
     return _place(speed, clearance)
 
 
-def _neighbour(shares: Mapping[str, float], run: MachineDiagnosis | None) -> Neighbour:
+def _others(
+    at_place: Callable[[Place], Machine],
+    centres: Iterable[Place],
+    runs: Mapping[Place, MachineDiagnosis | None],
+    initial_states: int,
+    budget: int,
+    workers: int | None,
+) -> dict[Place, tuple[Coexisting, ...]]:
+    """The other motions at each periodic centre; states are carried along all speeds of a clearance at once."""
+    periodic = [(place, run) for place in centres if (run := runs[place]) is not None and run.nature == "periodic"]
+    if initial_states == 1 or not periodic:
+        return {}
+    random = initial_states if initial_states >= FEWEST_STARTS else 0
+    speeds: dict[float, list[float]] = {}
+    for (speed, clearance), _ in periodic if random else ():
+        speeds.setdefault(clearance, []).append(speed)
+    rows = parallel_map(
+        lambda row: carried_over(at_place((row[1][0], row[0])), row[1]), list(speeds.items()), workers=workers
+    )
+    carried = dict(zip(speeds, rows, strict=True))
+
+    def beside(one: tuple[Place, MachineDiagnosis]) -> tuple[Coexisting, ...]:
+        (speed, clearance), centre = one
+        states = carried[clearance][speed] if random else None
+        machine = at_place((speed, clearance))
+        found = attractors(machine, starts=random, budget=budget, centre=centre, states=states, workers=1)
+        return coexisting(found, centre)
+
+    found = parallel_map(beside, periodic, workers=workers)
+    return dict(zip((place for place, _ in periodic), found, strict=True))
+
+
+def _neighbour(shares: Mapping[str, float], run: MachineDiagnosis | None, others: Sequence[Coexisting]) -> Neighbour:
+    """A point of the region by its motion that matters most: a change of the parameters may lead to any of them."""
     if run is None:
         return Neighbour(shares, "undetermined", np.nan)
-    return Neighbour(shares, run.nature, run.evidence["largest_peak"])
+    own = Coexisting(run.nature, run.evidence["largest_peak"])
+    settled = (one for one in (own, *others) if one is own or one.nature != UNSETTLED)
+    return Neighbour(shares, *max(settled, key=lambda one: (one.nature != "periodic", one.largest_peak)))

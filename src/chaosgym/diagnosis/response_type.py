@@ -14,22 +14,27 @@ from itertools import product
 from typing import Any, Literal, NamedTuple
 
 from chaosgym.arrays import Array
-from chaosgym.diagnosis.attractors import STARTS, Attractors, attractors
+from chaosgym.diagnosis.attractors import MOST_STARTS, STARTS, Attractors, attractors
 from chaosgym.diagnosis.carried import carried_states
 from chaosgym.diagnosis.diagnose import diagnose
-from chaosgym.diagnosis.type_rule import FORCE_CHANGE, Coexisting, Neighbour, judge_type
+from chaosgym.diagnosis.type_rule import FORCE_CHANGE, UNSETTLED, Coexisting, Neighbour, judge_type
 from chaosgym.diagnosis.verdict import MachineDiagnosis
 from chaosgym.errors import DiagnosisError
 from chaosgym.machines import Machine
 from chaosgym.machines.parameters import by_field, parameters_of, with_settings
-from chaosgym.series.verdict import Type
-from chaosgym.simulation import parallel_map
+from chaosgym.numbers import whole
+from chaosgym.plain import Result
+from chaosgym.series.verdict import COEXISTING, TYPE_MEANINGS, Definition, Type
+from chaosgym.simulation.parallel import parallel_map
 
 Window = Literal["parameters", "speed-clearance"]
 Start = Literal["rest", "continuation"]
 
 FEWEST_STARTS = 16
 """Random starts from which on other motions are searched for; fewer initial states are rest, or three fixed ones."""
+
+LEAST_STEPS = 0.9
+"""Steps of a grid that a tolerance must hold at least, so that neighbours on it are neighbours of a response type."""
 
 SHARES = (-1.0, -0.5, 0.5, 1.0)
 """Points of the region along one parameter, in tolerances."""
@@ -47,6 +52,17 @@ class Tolerance(NamedTuple):
         Relative tolerances are ratios, so that the points of a grid in geometric progression are neighbours.
         """
         return nominal * (1.0 + self.value) ** share if self.relative else nominal + share * self.value
+
+    def steps(self, value: float, following: float) -> int:
+        """Steps of a grid that the tolerance holds, by two neighbours of the grid; 0 where they are further apart.
+
+        Examples
+        --------
+        >>> Tolerance(0.02).steps(20.0, 20.2), Tolerance(0.02).steps(20.0, 21.0)
+        (2, 0)
+        """
+        steps = (self.at(value, 1.0) - value) / (following - value)
+        return 0 if steps < LEAST_STEPS else round(steps)
 
 
 def default_tolerances(machine: Machine) -> dict[str, Tolerance]:
@@ -73,7 +89,7 @@ def default_tolerances(machine: Machine) -> dict[str, Tolerance]:
 
 
 @dataclass(frozen=True, kw_only=True)
-class ResponseType:
+class ResponseType(Result):
     """The type of a response over its neighbourhood.
 
     Attributes
@@ -91,8 +107,10 @@ class ResponseType:
     attractors
         The motions at the centre, and how far was looked; None unless it is periodic and others were looked for.
     definition
-        Window, statistic and initial states: part of the label. Plain values.
+        Window, statistic, initial states and whose nature it is: part of the label. Plain values.
     """
+
+    shows = "type reason centre largest_peak neighbours coexisting_peaks attractors definition"
 
     type: Type
     reason: str
@@ -105,7 +123,8 @@ class ResponseType:
     @property
     def coexisting_peaks(self) -> tuple[float, ...]:
         """Largest peak of each of the other motions at the centre [N]."""
-        return tuple(one.largest_peak for one in coexisting(self.attractors, self.centre))
+        others = coexisting(self.attractors, self.centre)
+        return tuple(one.largest_peak for one in others if one.nature != UNSETTLED)
 
     @property
     def coexists(self) -> bool:
@@ -113,25 +132,17 @@ class ResponseType:
         others = coexisting(self.attractors, self.centre)
         return self.centre.nature == "periodic" and judge_type("periodic", self.largest_peak, (), others)[0] == "III"
 
+    @property
+    def meaning(self) -> str:
+        """What the type means for whoever relies on the machine."""
+        return COEXISTING if self.coexists else TYPE_MEANINGS[self.type]
+
     def over(self, built: Sequence[Neighbour]) -> "ResponseType":
         """Return the type over more machines of the region."""
         centre = self.centre.nature, self.largest_peak
         others = coexisting(self.attractors, self.centre)
         kind, reason = judge_type(*centre, [*self.neighbours, *built], others)
         return replace(self, type=kind, reason=reason)
-
-    def as_dict(self) -> dict[str, Any]:
-        """Return plain values for JSON."""
-        return {
-            "type": self.type,
-            "reason": self.reason,
-            "centre": self.centre.as_dict(),
-            "largest_peak": self.largest_peak,
-            "neighbours": [neighbour._asdict() for neighbour in self.neighbours],
-            "coexisting_peaks": list(self.coexisting_peaks),
-            "attractors": None if self.attractors is None else self.attractors.as_dict(),
-            "definition": dict(self.definition),
-        }
 
 
 def response_type(
@@ -143,6 +154,7 @@ def response_type(
     initial_states: int = STARTS,
     budget: int = 1600,
     sensor_error: float = 0.0,
+    definition: Definition = "settled",
     centre: MachineDiagnosis | None = None,
     workers: int | None = None,
 ) -> ResponseType:
@@ -167,6 +179,8 @@ def response_type(
         Cycles that each run may take.
     sensor_error
         Peak forces [N] that differ by less count as equal; see ``diagnose``.
+    definition
+        "settled", or "thesis": a response whose chaos dies out counts as chaotic (thesis 5.2.3).
     centre
         Verdict on the nominal machine from rest, if it is known already.
     workers
@@ -191,7 +205,7 @@ def response_type(
     check_initial_states(initial_states)
     if start not in ("rest", "continuation"):
         raise DiagnosisError(f"start = {start!r} is not one of 'rest', 'continuation'")
-    centre = centre or diagnose(machine, budget=budget, sensor_error=sensor_error)
+    centre = (centre or diagnose(machine, budget=budget, sensor_error=sensor_error)).labelled(definition)
     origin = centre.evidence["final_state"] if start == "continuation" else None
     neighbours: tuple[Neighbour, ...] = ()
     found: Attractors | None = None
@@ -203,17 +217,14 @@ def response_type(
             )
             for one in points
         ]
-        runs = parallel_map(
-            lambda one: diagnose(one, initial_state=origin, budget=budget, sensor_error=sensor_error),
-            machines,
-            workers=workers,
-        )
+        how: dict[str, Any] = {"initial_state": origin, "budget": budget, "sensor_error": sensor_error}
+        runs = parallel_map(lambda one: diagnose(one, **how).labelled(definition), machines, workers=workers)
         neighbours = tuple(
             Neighbour(shares, run.nature, run.evidence["largest_peak"])
             for shares, run in zip(points, runs, strict=True)
         )
         if initial_states > 1:
-            found, carried = _beside(machine, centre, allowed, initial_states, budget, workers)
+            found, carried = _beside(machine, centre, allowed, initial_states, budget, definition, workers)
             neighbours += carried
     largest = centre.evidence["largest_peak"]
     kind, reason = judge_type(centre.nature, largest, neighbours, coexisting(found, centre))
@@ -224,7 +235,7 @@ def response_type(
         largest_peak=largest,
         neighbours=neighbours,
         attractors=found,
-        definition=define(allowed, window, start, initial_states, budget, sensor_error),
+        definition=define(allowed, window, start, initial_states, budget, sensor_error, definition),
     )
 
 
@@ -234,6 +245,7 @@ def _beside(
     tolerances: Mapping[str, Tolerance],
     initial_states: int,
     budget: int,
+    definition: Definition,
     workers: int | None,
 ) -> tuple[Attractors, tuple[Neighbour, ...]]:
     """The motions at the centre, and what states carried along the speed do at the speeds of the region."""
@@ -242,7 +254,9 @@ def _beside(
     shares = {tolerances[name].at(nominal, share): share for share in SHARES} if name in tolerances else {}
     found, carried = motions_beside(machine, centre, initial_states, budget, workers, tuple(shares))
     runs = parallel_map(
-        lambda one: diagnose(machine.at(speed=one[0]), initial_state=one[1], budget=budget), carried, workers=workers
+        lambda one: diagnose(machine.at(speed=one[0]), initial_state=one[1], budget=budget).labelled(definition),
+        carried,
+        workers=workers,
     )
     return found, tuple(
         Neighbour({name: shares[speed]}, run.nature, run.evidence["largest_peak"])
@@ -275,7 +289,7 @@ def chosen_tolerances(
 
 def check_initial_states(initial_states: int) -> None:
     """Refuse a number of initial states that is neither 1, 3 nor enough for a search."""
-    if initial_states not in (1, 3) and not initial_states >= FEWEST_STARTS:
+    if whole("initial_states", initial_states, 1, MOST_STARTS, error=DiagnosisError) in (2, *range(4, FEWEST_STARTS)):
         raise DiagnosisError(
             f"initial_states = {initial_states!r} is out of range; allowed: 1, 3, or {FEWEST_STARTS} or more"
         )
@@ -303,11 +317,16 @@ def motions_beside(
 
 
 def coexisting(found: Attractors | None, centre: MachineDiagnosis) -> tuple[Coexisting, ...]:
-    """The motions that are not that of the centre; a neutral one is a family, whose force may be another."""
+    """The motions that are not that of the centre, and what did not settle.
+
+    A neutral motion at the centre is a family, whose force may be another.
+    """
     if found is None:
         return ()
     first = found.motions[:1] if found.motions[0].neutral else ()
-    return tuple(Coexisting(one.nature, one.largest_peak) for one in (*first, *found.motions[1:]))
+    others = tuple(Coexisting(one.nature, one.largest_peak) for one in (*first, *found.motions[1:]))
+    lost = found.unsettled or found.further_unsettled
+    return (*others, Coexisting(UNSETTLED, float("nan"))) if lost else others
 
 
 def define(
@@ -317,6 +336,7 @@ def define(
     initial_states: int,
     budget: int,
     sensor_error: float,
+    definition: Definition = "settled",
 ) -> dict[str, Any]:
     """The definition of a type label, as plain values."""
     return {
@@ -329,4 +349,5 @@ def define(
         "start": start,
         "budget": budget,
         "sensor_error": sensor_error,
+        "nature": definition,
     }

@@ -1,9 +1,10 @@
 """The smallest shock that leads from a motion to another one: its minimal fatal shock.
 
-A knock changes the velocity of a joint: an impulse along the joint's motion, which changes the velocities of a machine
-of modes by phi / |phi|^2 for every metre a second at the joint. Knocks of both directions, at some instants of the
-cycle where the machine has a section there, are tried from small to large; the smallest that leaves is halved towards
-the largest below it that comes back. Smaller ones may leave in directions or at instants that were not tried.
+A knock changes the velocity of a place, a joint or a named point of a machine of modes: an impulse along its motion,
+which changes the velocities of the modes by phi / |phi|^2 for every metre a second there. Knocks of both directions, at
+some instants of the cycle where the machine has a section there, are tried from small to large; the smallest that
+leaves, by the energy that it adds to the machine at rest, is halved towards the largest below it that comes back.
+Smaller ones may leave at places or instants that were not tried.
 
 L. Halekotte, U. Feudel, Minimal fatal shocks in multistable complex networks, Sci. Rep. 10 (2020) 11783.
 """
@@ -14,7 +15,7 @@ from typing import NamedTuple
 import numpy as np
 
 from chaosgym.arrays import Array
-from chaosgym.core import status
+from chaosgym.core import matrices, status
 from chaosgym.diagnosis.attractors import Attractors, Mapper
 from chaosgym.diagnosis.periodic_orbit import PRECISE
 from chaosgym.errors import SimulationError
@@ -32,13 +33,13 @@ HALVINGS = 12
 
 
 class Knock(NamedTuple):
-    """A sudden change of a joint's velocity.
+    """A sudden change of a place's velocity.
 
-    ``joint`` is its name, empty where there is one; ``velocity`` in m/s, or rad/s where the joint turns, upwards
-    positive; ``phase`` is the instant, as a share of the cycle.
+    ``at`` is the place, such as "the joint" or "point drive"; ``velocity`` in m/s, or rad/s where the joint turns,
+    upwards positive; ``phase`` is the instant, as a share of the cycle.
     """
 
-    joint: str
+    at: str
     velocity: float
     phase: float
 
@@ -65,7 +66,7 @@ class Shock(NamedTuple):
 
 
 def smallest_shock(machine: Machine, found: Attractors, *, knocks: int = 384, workers: int | None = None) -> Shock:
-    """The smallest knock at a joint that leads from the first motion of a search to another.
+    """The smallest knock at a place that leads from the first motion of a search to another.
 
     Parameters
     ----------
@@ -74,7 +75,7 @@ def smallest_shock(machine: Machine, found: Attractors, *, knocks: int = 384, wo
     found
         Its motions; the first must be a proven orbit.
     knocks
-        How many are tried, over joints, directions, instants and sizes.
+        How many are tried, over places, directions, instants and sizes.
     workers
         Number of threads; all processors by default.
 
@@ -86,30 +87,28 @@ def smallest_shock(machine: Machine, found: Attractors, *, knocks: int = 384, wo
     >>> smallest_shock(beam, attractors(beam), knocks=32).knock is None
     True
     """
-    rows = machine.unit_knocks
+    kinematics = machine.kinematics
+    rows = {} if kinematics is None else kinematics.unit_knocks
+    if not rows:
+        return Shock(0, 0.0, None, None)
     phases = [k / PHASES for k in range(PHASES)] if machine.section_at(0.0) is not None else [0.0]
-    ways = [(joint, phase, sign) for joint in range(len(rows)) for phase in phases for sign in (1.0, -1.0)]
+    ways = [(place, phase, sign) for place in rows for phase in phases for sign in (1.0, -1.0)]
     sizes = np.geomspace(SMALLEST, 1.0, max(2, knocks // len(ways)))
     half = machine.n_velocities
-    largest = [
-        float(found.box.reach * np.linalg.norm(found.box.scale[half : 2 * half]) / (float(np.linalg.norm(row)) or 1.0))
-        for row in rows
-    ]
+    fastest = float(found.box.reach * matrices.norm(found.box.scale[half : 2 * half]))
+    largest = {place: fastest / float(matrices.norm(row)) for place, row in rows.items()}
     mapper = Mapper(machine, found, workers)
 
     def ends(some: Sequence[Knock]) -> list[int | None]:
-        return mapper.reached([_knocked(machine, found, rows, one) for one in some])
+        return mapper.reached([knocked(machine, found, one.velocity * rows[one.at], one.phase) for one in some])
 
-    tried = [
-        Knock(_name(machine, joint), sign * size * largest[joint], phase)
-        for joint, phase, sign in ways
-        for size in sizes
-    ]
+    tried = [Knock(place, sign * size * largest[place], phase) for place, phase, sign in ways for size in sizes]
     reached = ends(tried)
     left = [number for number, place in enumerate(reached) if place != 0]
     if not left:
-        return Shock(len(tried), max(largest), None, None)
-    first = min(left, key=lambda number: abs(tried[number].velocity))
+        return Shock(len(tried), max(largest.values()), None, None)
+    # the smallest by what it adds to the energy of a machine of modes
+    first = min(left, key=lambda number: abs(tried[number].velocity) / largest[tried[number].at])
     knock, place = tried[first], reached[first]
     low, high = (abs(knock.velocity) * sizes[0] / sizes[1], abs(knock.velocity))
     for _ in range(HALVINGS):
@@ -119,32 +118,31 @@ def smallest_shock(machine: Machine, found: Attractors, *, knocks: int = 384, wo
             low = abs(middle.velocity)
         else:
             knock, place, high = middle, end, abs(middle.velocity)
-    return Shock(len(tried) + HALVINGS, max(largest), knock, place)
+    return Shock(len(tried) + HALVINGS, max(largest.values()), knock, place)
 
 
 def knock_words(machine: Machine, knock: Knock) -> str:
     """A knock in the machine's units, such as "a knock of 0.08 mm/s at the joint, 0.25 of a cycle after its start"."""
     turns = parameters_of(machine)[machine.clearance_field].unit == "rad"
     size = f"{abs(knock.velocity):.3g} rad/s" if turns else f"{1e3 * abs(knock.velocity):.3g} mm/s"
-    way = "to its upper stop" if knock.velocity > 0.0 else "to its lower stop"
-    where = f"the joint {knock.joint}" if knock.joint else "the joint"
-    return f"a knock of {size} at {where}, {way}, {knock.phase:.3g} of a cycle after its start"
+    joint = knock.at.startswith("the joint")
+    side = "upper" if knock.velocity > 0.0 else "lower"
+    way = f"to its {side} stop" if joint else "along its motion" if knock.velocity > 0.0 else "against its motion"
+    return f"a knock of {size} at {knock.at}, {way}, {knock.phase:.3g} of a cycle after its start"
 
 
-def _name(machine: Machine, joint: int) -> str:
-    return machine.joints[joint] if machine.joints else ""
+def knocked(machine: Machine, found: Attractors, change: Array, phase: float) -> Array | None:
+    """State (n_states,) at the end of the cycle in which the velocities of the first motion change at a phase.
 
-
-def _knocked(machine: Machine, found: Attractors, rows: Sequence[Array], knock: Knock) -> Array | None:
-    """State (n_states,) at the end of the cycle in which the first motion is knocked; None if it can't be followed."""
-    row = rows[machine.joints.index(knock.joint) if machine.joints else 0]
+    None if it can't be followed.
+    """
     half, begun = machine.n_velocities, found.motions[0].state
-    there = _part(machine, begun, 0.0, knock.phase) if knock.phase else begun
+    there = _part(machine, begun, 0.0, phase) if phase else begun
     if there is None:
         return None
     state = there.copy()
-    state[half : 2 * half] += knock.velocity * row
-    return _part(machine, state, knock.phase, 1.0 - knock.phase) if knock.phase else state
+    state[half : 2 * half] += change
+    return _part(machine, state, phase, 1.0 - phase) if phase else state
 
 
 def _part(machine: Machine, state: Array, phase: float, share: float) -> Array | None:

@@ -1,19 +1,24 @@
 """What a stage of a diagnosis tells: the verdict by its run, its exponent and its orbit, and the vote of each test."""
 
 from dataclasses import dataclass, replace
+from typing import Any
 
 import numpy as np
 
 from chaosgym.arrays import Array
 from chaosgym.diagnosis.periodic_orbit import PeriodicOrbit
-from chaosgym.series.exponent import LyapunovExponent
-from chaosgym.series.two_step import CHAOTIC_STATISTIC, QUASIPERIODIC_CYCLES, REGULAR_STATISTIC, two_step_test
-from chaosgym.series.verdict import Diagnosis, Nature, Status
+from chaosgym.series.exponent import LyapunovExponent, chaos_margin
+from chaosgym.series.transient_chaos import CHAOTIC_STATISTIC, INITIAL_TRANSIENT
+from chaosgym.series.two_step import QUASIPERIODIC_CYCLES, REGULAR_STATISTIC, irregular_start, two_step_test
+from chaosgym.series.verdict import Diagnosis, Nature, Status, escape_rate
 from chaosgym.simulation import CycleRecord
 
 GROWS = 1.05
 """Ratio of the largest displacements of the last quarter and of the one before it, above which a motion grows."""
 
+
+MORE = 4
+"""Budgets that are suggested where chaos lasted over one."""
 
 LARGER = ("a larger budget of cycles",)
 """What tells more of a run that has not settled."""
@@ -44,26 +49,32 @@ class Stage:
 def periodic(stage: Stage) -> Diagnosis | None:
     """The verdict if the motion is known to be periodic in the end, else None."""
     verdict, orbit = stage.verdict, stage.orbit
-    if orbit is not None:
+    status: Status = "agreed"
+    if orbit is not None and orbit.neutral:
+        reason = (
+            f"period {orbit.period} closes: miss {orbit.residual:.0e}; multiplier 1: deviations neither grow nor decay"
+        )
+        margin = verdict.margin
+    elif orbit is not None:
         reason = f"period {orbit.period} proven: miss {orbit.residual:.0e}, multiplier {orbit.largest_multiplier:.3g}"
-        margin = 1.0 - orbit.largest_multiplier
-        status: Status = "certified"
+        margin, status = 1.0 - orbit.largest_multiplier, "certified"
     elif verdict.settle_cycle is not None and stage.exponent.sign < 0:
         reason = f"{verdict.reason}; exponent {stage.exponent.per_cycle:.3g} a cycle"
-        margin, status = verdict.margin, "agreed"
+        margin = verdict.margin
     else:
         return None
     if stage.linear:
         reason = f"no contact: the machine is linear, and its response periodic; {reason}"
-    transient = _was_chaotic(stage)
-    if transient:
-        reason = f"transient chaos for {verdict.evidence['irregular_cycles']} cycles; then {reason}"
+    period = orbit.period if orbit else verdict.period
     return Diagnosis(
-        nature="chaotic" if transient else "periodic",
-        period=orbit.period if orbit else verdict.period,
+        nature="periodic",
+        period=period,
+        manner=", ".join(
+            filter(None, ("without contact" * stage.linear, "neutral" * (orbit is not None and orbit.neutral)))
+        ),
         margin=margin,
-        transient=transient,
-        status="transient" if transient else status,
+        transient_chaos=_transient_chaos(stage, period),
+        status=status,
         settle_cycle=verdict.settle_cycle if verdict.settle_cycle is not None else len(stage.record),
         reason=reason,
     )
@@ -82,10 +93,17 @@ def periodic_within(stage: Stage, sensor_error: float) -> Diagnosis | None:
     )
 
 
-def _was_chaotic(stage: Stage) -> bool:
-    """True if the irregular cycles before a recurrence were chaotic by the exponent too."""
-    irregular = stage.verdict.evidence.get("irregular_cycles", 0)
-    return stage.verdict.transient and float(np.mean(stage.growth[:irregular])) > 0.0
+def _transient_chaos(stage: Stage, period: int | None) -> int:
+    """Cycles of a motion that settles on a period for which it was chaotic, by the exponent too; 0 where it was not."""
+    irregular = stage.verdict.transient_chaos
+    if stage.verdict.settle_cycle is None and period is not None:
+        irregular = irregular_start(stage.record, period)
+    return _if_chaotic(stage, irregular)
+
+
+def _if_chaotic(stage: Stage, cycles: int) -> int:
+    """The first cycles of a motion if deviations grew over them and they are more than an ordinary start."""
+    return cycles if cycles > INITIAL_TRANSIENT and float(np.mean(stage.growth[:cycles])) > 0.0 else 0
 
 
 def without_contact(stage: Stage) -> Diagnosis:
@@ -95,14 +113,36 @@ def without_contact(stage: Stage) -> Diagnosis:
     last, before = (
         float(np.max(np.abs(part))) for part in np.split(record.displacement[-4 * (len(record) // 4) :], 4)[:1:-1]
     )
+    touched = np.flatnonzero(record.peak_force.any(axis=1))
+    common: dict[str, Any] = {
+        "status": "agreed",
+        "manner": "without contact",
+        "settle_cycle": int(touched[-1]) + 1 if len(touched) else 0,
+        "transient_chaos": _if_chaotic(stage, int(touched[-1]) + 1 if len(touched) else 0),
+    }
     if last > GROWS * before or exponent.sign > 0:
         reason = f"{lead}, but its motion still grows after {len(record)} cycles, so that contact may come later"
         return Diagnosis(nature="undetermined", margin=0.0, status="unresolved", reason=reason, tells_more=LARGER)
     if exponent.sign < 0:
         reason = f"{lead}, and its response nears the period of the drive; exponent {exponent.per_cycle:.3g} a cycle"
-        return Diagnosis(nature="periodic", period=1, margin=0.0, status="agreed", reason=reason)
+        return Diagnosis(nature="periodic", period=1, margin=0.0, reason=reason, **common)
     reason = f"{lead}, and its response a sum of lines: those of the drive and of undamped modes"
-    return Diagnosis(nature="quasiperiodic", margin=1.0, status="agreed", reason=reason)
+    return Diagnosis(nature="quasiperiodic", margin=1.0, reason=reason, **common)
+
+
+def lasting_margin(cycles: int) -> float:
+    """How far chaos that did not end in so many cycles is from an ordinary start of a motion that settles.
+
+    With 95 % confidence its mean length is a third of them at least. 0 where that is an ordinary start, 1 from a
+    hundred times as long on.
+
+    Examples
+    --------
+    >>> from chaosgym.diagnosis.stage import lasting_margin
+    >>> [round(lasting_margin(cycles), 2) for cycles in (150, 3200, 15000)]
+    [0.0, 0.66, 1.0]
+    """
+    return float(np.clip(0.5 * np.log10(1.0 / escape_rate(cycles) / INITIAL_TRANSIENT), 0.0, 1.0))
 
 
 def not_periodic(stage: Stage) -> Diagnosis:
@@ -110,9 +150,12 @@ def not_periodic(stage: Stage) -> Diagnosis:
     verdict, exponent = stage.verdict, stage.exponent
     reason = f"exponent {exponent.per_cycle:.3g} +- {exponent.standard_error:.2g} a cycle; {verdict.reason}"
     if exponent.sign > 0 and verdict.settle_cycle is None:
-        margin = float(np.clip(exponent.per_cycle / (3.0 * exponent.standard_error) - 1.0, 0.0, 1.0))
         status: Status = "agreed" if verdict.nature in ("chaotic", "undetermined") else "disputed"
-        return Diagnosis(nature="chaotic", margin=margin, status=status, reason=reason)
+        cycles = len(stage.record)
+        margin = min(chaos_margin(exponent.per_cycle, exponent.standard_error), lasting_margin(cycles))
+        rate = escape_rate(MORE * cycles)
+        more = f"a budget of {MORE * cycles} cycles: chaos that outlasts it ends at most at a rate of {rate:.1e}"
+        return Diagnosis(nature="chaotic", margin=margin, status=status, reason=reason, tells_more=(more,))
     settled = len(stage.record) - len(stage.record) // 2
     if exponent.sign == 0 and verdict.nature == "quasiperiodic" and settled >= QUASIPERIODIC_CYCLES:
         return Diagnosis(nature="quasiperiodic", margin=verdict.margin, status="agreed", reason=reason)

@@ -11,6 +11,7 @@ from typing import NamedTuple
 import numpy as np
 
 from chaosgym.arrays import Array
+from chaosgym.core import matrices
 from chaosgym.machines import Machine
 from chaosgym.machines.abilities import Flexible
 from chaosgym.simulation import CycleRecord
@@ -70,12 +71,12 @@ def start_box(machine: Machine, record: CycleRecord) -> StartBox:
     flexible = machine.without_friction
     rates = np.full(half, omega) if flexible is None else np.sqrt(flexible.stiffness)
     swing = np.where(rates > 0.0, rates, omega)
-    places, speeds = record.section[:, :half], record.section[:, half : 2 * half]
+    places, speeds = record.states[:, :half], record.states[:, half : 2 * half]
     moved = np.max(np.hypot(places, speeds / swing), axis=0)
     to_stops = _to_stops(machine, swing)
     scale = np.max([moved, *to_stops], axis=0)
-    gaps = max((float(np.linalg.norm(swing * shape)) for shape in to_stops), default=0.0)
-    measure = "gaps" if gaps >= float(np.linalg.norm(swing * moved)) else "times the motion"
+    gaps = max((float(matrices.norm(swing * shape)) for shape in to_stops), default=0.0)
+    measure = "gaps" if gaps >= float(matrices.norm(swing * moved)) else "times the motion"
     velocity = np.maximum(swing, omega) * scale
     rest = np.zeros(machine.n_states - 2 * half)
     return StartBox(np.concatenate([scale, velocity, rest]), _reach(flexible, velocity), measure)
@@ -83,7 +84,8 @@ def start_box(machine: Machine, record: CycleRecord) -> StartBox:
 
 def _to_stops(machine: Machine, swing: Array) -> list[Array]:
     """Displacements (n,) that bring each joint to its farthest stop with the least energy."""
-    shapes = [(np.abs(row) / swing**2, float(np.sum((row / swing) ** 2)), gap) for row, gap in machine.stop_rows]
+    stops = [] if machine.kinematics is None else machine.kinematics.stops
+    shapes = [(np.abs(row) / swing**2, float(np.sum((row / swing) ** 2)), gap) for row, gap in stops]
     return [gap * shape / compliance for shape, compliance, gap in shapes if compliance > 0.0]
 
 
@@ -94,5 +96,5 @@ def _reach(flexible: Flexible | None, velocity: Array) -> float:
     damping = np.diagonal(flexible.damping)
     with np.errstate(divide="ignore", invalid="ignore"):
         thrown = np.where(force > 0.0, force / damping, 0.0)
-        reach = float(np.linalg.norm(thrown) / np.linalg.norm(velocity))
+        reach = float(matrices.norm(thrown) / matrices.norm(velocity))
     return float(np.clip(np.nan_to_num(reach, nan=LEAST_REACH), LEAST_REACH, LARGEST_REACH))

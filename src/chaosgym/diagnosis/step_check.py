@@ -18,6 +18,7 @@ import numpy as np
 from chaosgym.diagnosis.diagnose import DEFAULT_BUDGET, diagnose
 from chaosgym.diagnosis.verdict import MachineDiagnosis
 from chaosgym.machines import Machine
+from chaosgym.plain import Result
 from chaosgym.series.verdict import Diagnosis, Nature
 from chaosgym.simulation import CycleRecord, Integrator
 
@@ -32,7 +33,7 @@ REFINEMENTS = 4
 
 
 @dataclass(frozen=True)
-class StepCheck:
+class StepCheck(Result):
     """The verdicts of one machine with a given and with a finer integrator.
 
     Attributes
@@ -42,6 +43,8 @@ class StepCheck:
     settled
         Whether the last two steps tried agree. If not, the machine's own verdict is undetermined.
     """
+
+    shows = "nature_stays period_stays spread_stays summary settled"
 
     given: MachineDiagnosis
     finer: MachineDiagnosis
@@ -87,39 +90,28 @@ class StepCheck:
             f"a finer step {kept} the verdict ({finer}); spread of the peak force {self.spreads[0]:.2f} N, "
             f"finer {self.spreads[1]:.2f} N"
         )
-        if self.given.transient or self.finer.transient:
+        if self.given.transient_chaos or self.finer.transient_chaos:
             before, after = self.settle_cycles
-            line += (
-                f"; irregular first, it settles after {before} cycles, finer {after}: that depends on the last digit"
-            )
+            line += f"; chaotic first, it settles after {before} cycles, finer {after}: that depends on the last digit"
         return line
 
     def as_dict(self) -> dict[str, Any]:
         """Return plain values for JSON."""
-        return {
-            "nature_stays": self.nature_stays,
-            "period_stays": self.period_stays,
-            "spread_stays": self.spread_stays,
-            "spread_N": self.spreads[0],
-            "finer_spread_N": self.spreads[1],
-            "finer_nature": _end(self.finer)[0],
-            "finer_period": self.finer.period,
-            "settle_cycle": self.settle_cycles[0],
-            "finer_settle_cycle": self.settle_cycles[1],
-            "settled": self.settled,
-            "summary": self.summary,
-        }
+        spreads = zip(("spread_N", "finer_spread_N"), self.spreads, strict=True)
+        cycles = zip(("settle_cycle", "finer_settle_cycle"), self.settle_cycles, strict=True)
+        finer = {"finer_nature": _end(self.finer)[0], "finer_period": self.finer.period}
+        return {**super().as_dict(), **dict(spreads), **finer, **dict(cycles)}
 
 
 def _end(verdict: Diagnosis) -> tuple[Nature, int | None]:
     """Nature and period of what the motion settles on."""
-    return ("periodic" if verdict.transient else verdict.nature), verdict.period
+    return verdict.nature, verdict.period
 
 
 def _settled(verdict: MachineDiagnosis) -> CycleRecord:
     """Cycles of what the motion settles on."""
     run = verdict.run
-    settle = verdict.settle_cycle if verdict.transient and verdict.settle_cycle is not None else 0
+    settle = verdict.settle_cycle if verdict.transient_chaos and verdict.settle_cycle is not None else 0
     return run.after(min(settle, len(run) - 1)) if settle > len(run) // 2 else verdict.judged
 
 

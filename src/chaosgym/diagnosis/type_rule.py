@@ -14,7 +14,7 @@ In numbers, for the point in the middle of its region:
                   a motion that coexists in the middle is not periodic, or its largest peak more than 10 % away
     II            otherwise, if some point of the region is not periodic, or has a largest peak more than 10 % higher
     I             the rest
-    undetermined  if the point is
+    undetermined  if the point is, or if it is not III but other initial states do not settle
 
 A cut is a plane in the space of the deviations, measured in tolerances. Along one parameter periodic and chaotic points
 are mixed if their nature changes more than once. A point that is undetermined is not known to be periodic, and counts
@@ -39,8 +39,12 @@ CROSS = ((0, 0), (-1, 0), (1, 0), (0, -1), (0, 1))
 """The smallest neighbourhood: a point and, in tolerances of speed and of clearance, the four beside it."""
 
 
+UNSETTLED = "undetermined"
+"""Nature of what other initial states do that do not settle within the budget."""
+
+
 class Coexisting(NamedTuple):
-    """Another motion in the middle of the region, from another initial state."""
+    """Another motion in the middle of the region, from another initial state; its nature may be ``UNSETTLED``."""
 
     nature: str
     largest_peak: float
@@ -86,11 +90,20 @@ def judge_type(
         return "undetermined", "the nominal response is undetermined"
     if nature != "periodic":
         return "III", f"the nominal response is {nature}"
-    for other in coexisting:
+    settled = [one for one in coexisting if one.nature != UNSETTLED]
+    for other in settled:
         if other.nature != "periodic":
             return "III", f"another initial state leads to a {other.nature} motion, up to {other.largest_peak:.3g} N"
         if apart(other.largest_peak, largest_peak):
             return "III", f"another initial state leads to {other.largest_peak:.3g} N instead of {largest_peak:.3g} N"
+    kind, reason = _by_the_region(points, largest_peak)
+    if kind != "III" and len(settled) < len(coexisting):
+        return "undetermined", "other initial states do not settle within the budget"
+    return kind, reason
+
+
+def _by_the_region(points: Sequence[Neighbour], largest_peak: float) -> tuple[Type, str]:
+    """Type of a periodic response and its reason, by the points around it alone."""
     restless = [point for point in points if point.nature != "periodic"]
     if restless:
         found = f"{len(restless)} of {len(points) + 1} points in the tolerances are not periodic"

@@ -1,10 +1,12 @@
 """The verdict on a machine: a diagnosis with the run that it rests on."""
 
-from dataclasses import dataclass, field, fields
-from typing import Any
+from dataclasses import dataclass, field, fields, replace
+from typing import Any, Self
 
+from chaosgym.diagnosis.periodic_orbit import PeriodicOrbit
 from chaosgym.errors import DiagnosisError
-from chaosgym.series.verdict import Diagnosis
+from chaosgym.series.exponent import chaos_margin
+from chaosgym.series.verdict import Definition, Diagnosis
 from chaosgym.simulation import CycleRecord
 
 
@@ -16,12 +18,15 @@ class MachineDiagnosis(Diagnosis):
     ----------
     record
         The run that was judged; None where two outcomes were compared alone.
+    orbit
+        The proven orbit, with its smallest period; None where none was proven.
     orbit_record
-        The motion on the proven orbit, whole periods of it; None where none was proven.
+        The motion on it, whole periods.
     """
 
     searched: str = "not looked for"
     record: CycleRecord | None = field(default=None, repr=False, compare=False)
+    orbit: PeriodicOrbit | None = field(default=None, repr=False, compare=False)
     orbit_record: CycleRecord | None = field(default=None, repr=False, compare=False)
 
     @property
@@ -52,6 +57,13 @@ class MachineDiagnosis(Diagnosis):
         All of it where an orbit is proven, since such a run may still be on its way; else its first half.
         """
         return self.run if self.orbit_record is not None else self.run.until(len(self.run) // 2)
+
+    def labelled(self, definition: Definition) -> Self:
+        """As of ``Diagnosis``; the margin of chaos by the definition of the thesis is that of its exponent alone."""
+        exponent = self.evidence.get("largest_lyapunov_exponent_per_cycle")
+        if definition == "settled" or self.transient_chaos or self.nature != "chaotic" or exponent is None:
+            return super().labelled(definition)
+        return replace(self, margin=chaos_margin(exponent["value"], exponent["standard_error"]))
 
 
 def of_machine(verdict: Diagnosis, **changes: Any) -> MachineDiagnosis:

@@ -41,6 +41,8 @@ def register_environments() -> None:
     for task, keywords in TASKS.items():
         _register(f"chaosgym/Machine{task}-v0", keywords)
     _register("chaosgym/AnyMachine-v0", {"machine": "any", "objective": "life"})
+    if "chaosgym/Plant-v0" not in registry:
+        register(id="chaosgym/Plant-v0", entry_point="chaosgym.envs.plant_env:PlantEnv")
 
 
 def _register(name: str, keywords: dict[str, Any]) -> None:

@@ -50,10 +50,11 @@ class Entry:
     def forget(self, which: Indices) -> None:
         """Begin anew for the jobs ``which`` (k,)."""
 
-    def values(self, which: Indices, peaks: Array, jobs: NDArray[np.void]) -> Array:
+    def values(self, which: Indices, peaks: Array, jobs: NDArray[np.void], seen: NDArray[np.float32]) -> Array:
         """Values (k,) after a step of the jobs ``which`` (k,).
 
-        ``peaks`` (k, cycles) are measured forces [N], ``jobs`` (k,) records ``JOB`` of ``envs.kernels.steps``.
+        ``peaks`` (k, cycles) are measured forces [N], ``jobs`` (k,) records ``JOB`` of ``envs.kernels.steps``, ``seen``
+        (k, entries) the observations, whose first entries are filled.
         """
         raise NotImplementedError
 
@@ -75,7 +76,7 @@ class MonitorLevel(Entry):
         """Reset the sums."""
         self._sums.forget(which)
 
-    def values(self, which: Indices, peaks: Array, jobs: NDArray[np.void]) -> Array:
+    def values(self, which: Indices, peaks: Array, jobs: NDArray[np.void], seen: NDArray[np.float32]) -> Array:
         """Level after the last of the ``peaks``."""
         for column in peaks.T:
             self._sums.add(which, column, self._error)
@@ -92,19 +93,25 @@ class SetPoint(Entry):
         """From rest to the highest speed."""
         return 0.0, task.highest_speed
 
-    def values(self, which: Indices, peaks: Array, jobs: NDArray[np.void]) -> Array:
+    def values(self, which: Indices, peaks: Array, jobs: NDArray[np.void], seen: NDArray[np.float32]) -> Array:
         """Set-point of the step."""
         return np.asarray(jobs["set_point"])
 
 
 class IrregularProbability(Entry):
-    """Answer of the machine's trained classifier of records."""
+    """What the machine's trained sense of its motion makes of the readings at this speed.
+
+    Attributes
+    ----------
+    records
+        The readings of each job since its speed last changed.
+    """
 
     name = "irregular_probability"
-    meaning = "how likely the classifier of records holds the motion at this speed irregular"
+    meaning = "how likely the machine's trained sense holds the motion at this speed irregular"
 
     def __init__(self, task: Any, nominal: Machine, count: int) -> None:
-        self._records = RecordsAtSpeed(nominal, task.sensor_error, count)
+        self.records = RecordsAtSpeed(nominal, task.sensor_error, count)
 
     @staticmethod
     def bounds(task: Any) -> tuple[float, float]:
@@ -113,12 +120,13 @@ class IrregularProbability(Entry):
 
     def forget(self, which: Indices) -> None:
         """Drop the records."""
-        self._records.forget(which)
+        self.records.forget(which)
 
-    def values(self, which: Indices, peaks: Array, jobs: NDArray[np.void]) -> Array:
-        """Probability by the peaks since the last change of speed."""
-        self._records.add(which, jobs["speed"], peaks)
-        return self._records.irregular_probability(which)
+    def values(self, which: Indices, peaks: Array, jobs: NDArray[np.void], seen: NDArray[np.float32]) -> Array:
+        """Probability by the readings since the last change of speed."""
+        impacts, bouncing = seen[:, [PLACE.impacts_per_cycle, PLACE.bouncing_share]].astype(float).T
+        self.records.add(which, jobs["speed"], peaks, impacts, bouncing)
+        return self.records.irregular_probability(which)
 
 
 def adds(entry: type[Entry], source: str, choices: tuple[str, str] = ("off", "on")) -> Any:
@@ -139,7 +147,7 @@ class AddedEntries:
     )
     classifier: str = adds(
         IrregularProbability,
-        "whether it is observed how likely the trained classifier of records holds the motion irregular",
+        "whether it is observed how likely the machine's trained sense holds the motion irregular",
     )
 
     @cached_property

@@ -20,6 +20,7 @@ from chaosgym.envs.task import Status, Task, demand_of
 from chaosgym.envs.variants import DRAWN, Variants
 from chaosgym.errors import SimulationError
 from chaosgym.machines.batch import Cycles, KickedBatch, VaryingBatch
+from chaosgym.machines.ignorable import ignorable
 from chaosgym.machines.machine import Machine
 
 Generators = Sequence[np.random.Generator]
@@ -49,6 +50,8 @@ class Segment(NamedTuple):
 class Jobs:
     """Jobs of a ``task`` on machines that run side by side, with observations of a ``space``.
 
+    Each machine does ``of_each`` jobs in turn.
+
     Attributes
     ----------
     machines
@@ -59,6 +62,8 @@ class Jobs:
         Of every step of the job.
     damage : (N, sides)
         Of each surface; 1 ends a job.
+    entries
+        What fills the entries that keywords add to the observation.
     told
         Names of the columns of a report that are the info of a step.
     force : (N,)
@@ -67,11 +72,13 @@ class Jobs:
         Number of the first jobs of which ``segments`` keeps where the last step began, for pictures; a list each.
     """
 
-    def __init__(self, task: Task, variants: Variants | Pool, space: Box, count: int) -> None:
+    def __init__(self, task: Task, variants: Variants | Pool, space: Box, count: int, of_each: int = 1) -> None:
         nominal = variants.nominal
         self.task, self.variants, self.space, self.batch = task, variants, space, variants.batch(count)
-        self.judge: Judge = (ExponentJudge if isinstance(self.batch, VaryingBatch) else RecurrenceJudge)(count)
-        self._entries = [entry(task, nominal, count) for entry in task.added]
+        # how far a free body has gone outgrows the rest of a deviation that the batch carries
+        exact = isinstance(self.batch, VaryingBatch) and ignorable(nominal) is None
+        self.judge: Judge = (ExponentJudge if exact else RecurrenceJudge)(count)
+        self.entries = [entry(task, nominal, count) for entry in task.added]
         self._drive = (Motors if task.drive == "motor" else ConstantSpeed)(nominal, count)
         self.told = self._drive.info
         self.machines: list[Machine] = [nominal] * count
@@ -82,6 +89,8 @@ class Jobs:
         self._lowest, self._span, self.force = np.zeros(count), np.ones(count), np.ones(count)
         self._job_time = np.ones(count)
         self._velocities = nominal.n_velocities
+        self._of_each, self._begun = of_each, np.zeros(count, np.int64)
+        self._drawn_by: list[np.random.Generator | None] = [None] * count
         self.traced = 0
         self.segments: list[list[Segment]] = [[] for _ in range(count)]
 
@@ -119,17 +128,18 @@ class Jobs:
         """
         task, variants = self.task, self.variants
         count = max(task.run_in_cycles, task.cycles_per_step)
-        self._draw(which, generators, numbers, speed)
+        same = self._same_machine(which, generators, numbers)
+        self._draw(which, generators, numbers, speed, same)
         if numbers is None:
             self._redraw_stalled(which, generators, speed, count)
         state = self.state[which]
         state["trim"], state["worn"] = 0.0, state["clearance"]
-        state["machine"] = DRAWN if numbers is None else numbers
+        state["machine"] = np.where(same, state["machine"], DRAWN if numbers is None else numbers)
         for name in ("done", "changed", "off", "irregular", "seconds", "largest_force"):
             state[name] = 0
         self.state[which], self.damage[which] = state, 0.0
         self.judge.start(which)
-        for entry in self._entries:
+        for entry in self.entries:
             entry.forget(which)
         for i in which.tolist():
             self.batch.start(i, self.machines[i].at(self._speed_of(i)))
@@ -158,13 +168,30 @@ class Jobs:
         }
         return self._observe(which, cycles, period, generators), info
 
-    def _draw(self, which: Indices, generators: Generators, numbers: Indices | None, speed: float | None) -> None:
-        """Give the jobs ``which`` machines, demands and speeds."""
+    def _same_machine(self, which: Indices, generators: Generators, numbers: Indices | None) -> NDArray[np.bool_]:
+        """Whether the jobs ``which`` (k,) begin on the machine of the last one; a new generator begins with another."""
+        new = np.array([one is not self._drawn_by[i] for i, one in zip(which.tolist(), generators, strict=True)])
+        for i, one in zip(which.tolist(), generators, strict=True):
+            self._drawn_by[i] = one
+        begun = np.where(new | (numbers is not None), 0, self._begun[which])
+        self._begun[which] = begun + 1
+        return np.asarray(begun % self._of_each != 0)
+
+    def _draw(
+        self,
+        which: Indices,
+        generators: Generators,
+        numbers: Indices | None,
+        speed: float | None,
+        same: NDArray[np.bool_],
+    ) -> None:
+        """Give the jobs ``which`` machines, unless they have the ``same``, demands and speeds."""
         task, variants = self.task, self.variants
         for k, (i, generator) in enumerate(zip(which.tolist(), generators, strict=True)):
             drawn = variants.drawn(generator)
             self.demand[i] = demand_of(task, generator)
-            self.machines[i] = drawn if numbers is None else variants.held_out(int(numbers[k]))
+            if not same[k]:
+                self.machines[i] = drawn if numbers is None else variants.held_out(int(numbers[k]))
             self.state["clearance"][i] = getattr(self.machines[i], drawn.clearance_field)
             self._lowest[i], self._span[i], self.force[i] = units = variants.units(self.machines[i])
             top = units.lowest + units.span * task.highest_speed
@@ -185,7 +212,7 @@ class Jobs:
                 return
             generators = [each for each, again in zip(generators, stalled, strict=True) if again]
             which = which[stalled]
-            self._draw(which, generators, None, speed)
+            self._draw(which, generators, None, speed, np.zeros(len(which), np.bool_))
 
     def _start_drive(self, which: Indices) -> Array:
         """Let machines turn at the speeds of their jobs, which are returned in the unit of the machine."""
@@ -288,6 +315,6 @@ class Jobs:
         sensed_peaks = self.variants.nominal.sensed(cycles.peak_force)
         given = (task.numbers, which, self.demand, self.state, sensed_peaks, cycles.bounce_duration, period)
         call(observe, *given, *drawn, space.low, space.high, measured, values)
-        for entry in self._entries:
-            values[:, task.places[entry.name]] = entry.values(which, measured, self.state[which])
+        for entry in self.entries:
+            values[:, task.places[entry.name]] = entry.values(which, measured, self.state[which], values)
         return values

@@ -81,5 +81,5 @@ def _usual_task(machine: Machine) -> Task:
         largest_change=span / 3.5,
         start_below=span / 7,
         deviation_weight=3.5 / span,
-        speed_ripple=0.002 if machine.carries_deviations else 0.0,
+        speed_ripple=0.0 if machine.moving.costly else 0.002,
     )

@@ -5,7 +5,6 @@ motion goes on from the state in which the last step ended.
 """
 
 from collections.abc import Mapping
-from copy import deepcopy
 from dataclasses import replace
 from typing import TYPE_CHECKING, Any, cast
 
@@ -18,6 +17,7 @@ from numpy.typing import NDArray
 from chaosgym.arrays import Indices
 from chaosgym.envs.drive import action_space, checked_actions
 from chaosgym.envs.jobs import Jobs
+from chaosgym.envs.judge import statement_of
 from chaosgym.envs.levels import task_of, tolerances_of
 from chaosgym.envs.motors import refuse_drive
 from chaosgym.envs.observation import Observation, observation_space
@@ -26,8 +26,11 @@ from chaosgym.envs.task import Status, Task, UnknownKeywordError, divided
 from chaosgym.envs.variants import OTHER_SIMULATOR, Variants
 from chaosgym.errors import ParameterError
 from chaosgym.machines import MACHINES
+from chaosgym.machines.accuracy import is_tolerance, model_within
 from chaosgym.machines.machine import Machine
-from chaosgym.machines.parameters import parameters_of, with_settings
+from chaosgym.machines.parameters import expand_fidelity, parameters_of, with_settings
+from chaosgym.numbers import whole
+from chaosgym.series.verdict import Statement
 from chaosgym.simulation import CycleRecord
 
 if TYPE_CHECKING:
@@ -35,6 +38,9 @@ if TYPE_CHECKING:
 
 FIRST = np.zeros(1, np.int64)
 """Index array of the only job."""
+
+MODEL_SPEEDS = 5
+"""Speeds of the range at all of which a model within a tolerance has to serve."""
 
 METADATA: dict[str, Any] = {"render_modes": ["human", "rgb_array"], "render_fps": 10}
 
@@ -72,15 +78,19 @@ class EnvSettings:
     level
         What differs from job to job: "nominal", "clearance", "wear" or "fleet".
     split
-        Part of the level's machines: "train", "test", "outside" or, of the beam, "other_simulator"; None for all within
-        its tolerances. Of any machine: "train", "test" or "other_machines"; None trains on the first and keeps the
-        second for evaluation.
+        Part of the level's machines: "train", "test", "outside", "corner" or, of the beam, "other_simulator"; None for
+        all within its tolerances. Of any machine: "train", "test" or "other_machines"; None trains on the first and
+        keeps the second for evaluation.
     sealed
         Whether the machines kept for evaluation are the 512 of this release instead of the 256 of development.
+    jobs
+        Jobs that a machine does in turn, set right in between, before another is drawn; a reset with a seed or of a
+        machine's number begins anew.
     tolerances
         Half width of each field that varies, as a share of its nominal value, instead of the level's.
     fidelity, model_fidelity
-        Rungs of the ladder: of the machine at work, and of ``model``, the nominal machine that controllers may use.
+        Rungs of the ladder: of the machine at work, and of ``model``, the nominal machine that controllers may use. Or
+        errors that are allowed, such as "1 %": all machines have the cheapest model within it over the speeds.
     keywords
         Fields of ``Task`` and of the machine.
 
@@ -92,8 +102,9 @@ class EnvSettings:
         If a keyword is unknown.
     """
 
-    def __init__(self, machine: str, **keywords: Any) -> None:
+    def __init__(self, machine: str, *, jobs: int = 1, **keywords: Any) -> None:
         self.variants: Variants | Pool
+        self.jobs_of_each = whole("jobs", jobs, 1, 10**6)
         if machine == ANY:
             self._take_any(**keywords)
         else:
@@ -104,7 +115,7 @@ class EnvSettings:
 
     def jobs(self, count: int) -> Jobs:
         """Make the jobs of this many machines."""
-        return Jobs(self.task, self.variants, self.space, count)
+        return Jobs(self.task, self.variants, self.space, count, self.jobs_of_each)
 
     def _take_any(self, *, split: str | None = None, **keywords: Any) -> None:
         """A machine of the pool in each job; there is no model of it for controllers."""
@@ -141,14 +152,18 @@ class EnvSettings:
         self.task, fields = divided(task_of(usual, level), usual, keywords)
         base = {name: value for name, value in defaults.fields.items() if name not in fields}
         if fidelity is not None:
-            base = {name: value for name, value in base.items() if name not in kind.fidelity_ladder.get(fidelity, {})}
-            fields["fidelity"] = fidelity
+            chosen = kind.model_fields if is_tolerance(fidelity) else kind.fidelity_ladder.get(fidelity, {})
+            base = {name: value for name, value in base.items() if name not in chosen}
+            fields = expand_fidelity(usual, {**fields, "fidelity": fidelity})
         nominal: Machine = with_settings(usual, base | fields)
         for name in ("lowest_speed", "highest_speed"):
             try:
                 nominal.at(getattr(self.task, name))
             except ParameterError as error:
                 raise ParameterError(f"{name}: {error}") from None
+        if fidelity is not None and is_tolerance(fidelity):
+            speeds = np.linspace(self.task.lowest_speed, self.task.highest_speed, MODEL_SPEEDS).tolist()
+            nominal = model_within(nominal, fidelity, [nominal.at(speed) for speed in speeds]).machine
         self.variants = Variants(nominal, widths if tolerances is None else tolerances, split, sealed=sealed)
         self.model = with_settings(nominal, defaults.model if model_fidelity is None else {"fidelity": model_fidelity})
         self.unit = parameters_of(nominal)[nominal.speed_field].unit
@@ -167,6 +182,15 @@ def refuse_pictures(settings: EnvSettings, render_mode: str | None) -> None:
         raise ParameterError(f"render_mode = {render_mode!r} is not possible with {whose}; allowed: None")
 
 
+def copied(value: Any) -> Any:
+    """Copy what keywords are made of, as deep as it goes; anything else, such as a plant, can't always be copied."""
+    if isinstance(value, Mapping):
+        return {name: copied(each) for name, each in value.items()}
+    if isinstance(value, list | tuple):
+        return type(value)(copied(each) for each in value)
+    return value.copy() if isinstance(value, np.ndarray) else value
+
+
 class JobSpec:
     """Specification of an environment whose job ends by itself, as termination, after ``task.steps``."""
 
@@ -183,7 +207,7 @@ class JobSpec:
 
     @spec.setter
     def spec(self, given: EnvSpec | None) -> None:
-        self._spec = None if given is None else replace(given, kwargs=deepcopy(given.kwargs))
+        self._spec = None if given is None else replace(given, kwargs=copied(given.kwargs))
 
 
 class MachineEnv(JobSpec, gym.Env[Observation, Any]):
@@ -209,8 +233,11 @@ class MachineEnv(JobSpec, gym.Env[Observation, Any]):
     def __init__(self, machine: str = "", *, render_mode: str | None = None, **keywords: Any) -> None:
         if render_mode is not None and render_mode not in METADATA["render_modes"]:
             raise ParameterError(f"render_mode = {render_mode!r} is not one of None, human, rgb_array")
-        self.render_mode = render_mode
-        self.settings = EnvSettings(machine, **keywords)
+        self._take_settings(EnvSettings(machine, **keywords), render_mode)
+
+    def _take_settings(self, settings: EnvSettings, render_mode: str | None) -> None:
+        """Take task, spaces and jobs of some settings."""
+        self.render_mode, self.settings = render_mode, settings
         refuse_pictures(self.settings, render_mode)
         self.task, self.model = self.settings.task, self.settings.model
         self.nominal = self.settings.variants.nominal
@@ -220,6 +247,7 @@ class MachineEnv(JobSpec, gym.Env[Observation, Any]):
         self._job = self.settings.jobs(1)
         self._job.traced = 0 if render_mode is None else 1
         self._runs = False
+        self._last: dict[str, Any] = {}
         self._dashboard: Dashboard | None = None
 
     @property
@@ -231,6 +259,19 @@ class MachineEnv(JobSpec, gym.Env[Observation, Any]):
     def machine(self) -> Machine:
         """Machine of the current job, at its current speed and clearance."""
         return self._job.machine_at(0)
+
+    @property
+    def statement(self) -> Statement:
+        """What the last step tells of the running motion, in the form of every verdict.
+
+        Raises
+        ------
+        gymnasium.error.ResetNeeded
+            Before the first step.
+        """
+        if not self._last:
+            raise gym.error.ResetNeeded("no step was run; call reset() and step() first")
+        return statement_of(self._job.judge, self._last, self.task.cycles_per_step)
 
     def reset(
         self, *, seed: int | None = None, options: dict[str, Any] | None = None
@@ -256,7 +297,7 @@ class MachineEnv(JobSpec, gym.Env[Observation, Any]):
         speed, numbers = start_of(self.settings, options or {}, 1)
         self._runs = False
         observation, info = self._job.start(FIRST, [self.np_random], numbers, speed)
-        self._runs = True
+        self._runs, self._last = True, {}
         if self.render_mode is not None:
             self._show().start()
             if self.render_mode == "human":
@@ -278,7 +319,7 @@ class MachineEnv(JobSpec, gym.Env[Observation, Any]):
         actions = checked_actions(self.task, [action], 1)
         outcome = self._job.step(FIRST, actions, [self.np_random])
         info = dict(zip(self._job.told, outcome.report.item(), strict=False))
-        self._runs = info["status"] == Status.RUNNING
+        self._runs, self._last = info["status"] == Status.RUNNING, info
         if self.render_mode is not None:
             self._show().add(info, outcome.observation[0])
             if self.render_mode == "human":

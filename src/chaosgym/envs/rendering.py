@@ -17,11 +17,12 @@ from numpy.typing import NDArray
 
 from chaosgym.arrays import Array
 from chaosgym.envs.jobs import Segment
+from chaosgym.envs.judge import nature_of
 from chaosgym.envs.kernels.steps import PLACE
 from chaosgym.envs.task import Task
 from chaosgym.machines.machine import Machine
 from chaosgym.machines.parameters import parameters_of
-from chaosgym.machines.picture import CALM, INK, LIMIT, PALE, STAYS, WILD, samples_of
+from chaosgym.machines.picture import CALM, INK, LIMIT, PALE, STAYS, WILD, draw, samples_of
 from chaosgym.simulation import CycleRecord, MotionState, simulate
 
 Frame = NDArray[np.uint8]
@@ -114,7 +115,7 @@ class Dashboard:
         self._speeds.append(float(info["speed"]))
         self._demands.append(float(info["demand"]))
         self._peaks.append(float(observation[PLACE.mean_peak_force]))
-        self._wild.append(bool(info["type_iii"] > 0.5))
+        self._wild.append(nature_of(info["type_iii"]) == "irregular")
 
     def draw(self, record: CycleRecord) -> Frame | None:
         """Draw the last step, given with its time history; return (height, width, 3), or None for a window."""
@@ -238,7 +239,7 @@ class Dashboard:
         for artist in (*panel.lines, *panel.collections, *panel.patches, *panel.texts):
             artist.remove()
         moment = (len(self._speeds) % STROBE) / STROBE
-        record.machine.draw(panel, record, colour, moment, self._task.reference_force)
+        draw(panel, record, colour, moment, self._task.reference_force)
         staying = [text.get_text() for text in self._texts(stays=True)]
         if staying != self._staying:
             self._staying, self._background = staying, None
@@ -253,7 +254,7 @@ class Dashboard:
             panel.draw_artist(part)
 
     def _update_title(self, record: CycleRecord, colour: str) -> None:
-        verdict = "irregular" if colour == WILD else "calm"
+        verdict = nature_of(float(colour == WILD))
         done = len(self._speeds) * self._task.cycles_per_step
         speed = self._speeds[-1] if self._speeds else float(getattr(record.machine, record.machine.speed_field))
         self._title.set(

@@ -36,7 +36,7 @@ from numpy.typing import NDArray
 from chaosgym.arrays import Array
 from chaosgym.envs.entries import AddedEntries
 from chaosgym.envs.kernels import steps
-from chaosgym.errors import ParameterError
+from chaosgym.errors import ParameterError, nearest_or
 from chaosgym.machines.machine import Machine
 from chaosgym.machines.parameters import parameter, parameters_of, validate
 from chaosgym.rating_life import damage_in_a_million
@@ -183,11 +183,9 @@ def divided(task: Task, machine: Machine, keywords: Mapping[str, Any]) -> tuple[
         if name == machine.speed_field:
             raise ParameterError(f"{name} is what the agent sets; give lowest_speed and highest_speed instead")
         if name not in own and name not in theirs and name != "fidelity":
-            from difflib import get_close_matches
-
-            ours = ("objective", "fidelity", "model_fidelity", "tolerances", "level", "split", "sealed")
-            near = get_close_matches(name, [*own, *theirs, *ours])
-            hint = f"did you mean {near[0]}?" if near else f"known: {', '.join(own)}, and the fields of {machine.name}"
+            ours = ("objective", "fidelity", "model_fidelity", "tolerances", "level", "split", "sealed", "jobs")
+            there = f"known: {', '.join(own)}, and the fields of {machine.name}"
+            hint = nearest_or(there, name, [*own, *theirs, *ours])
             raise UnknownKeywordError(f"unexpected keyword argument {name!r}; {hint}")
     mine = {name: value for name, value in keywords.items() if name in own}
     return replace(task, **mine), {name: value for name, value in keywords.items() if name not in own}

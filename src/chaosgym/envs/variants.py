@@ -6,6 +6,10 @@ that cube, or what lies around it, so that no two splits share a machine:
     train       three of four cells of a checkerboard with eight cells to a side
     test        the fourth of them
     outside     one field, in turn, at one to two half widths from the nominal value, the others within
+    corner      every field at one to one and a half half widths
+
+Each cell of the test has cells of training on all sides: a policy interpolates there. In ``outside`` and ``corner`` it
+extrapolates.
 
 ``other_simulator`` has the machines of the test, simulated by Exudyn.
 """
@@ -37,7 +41,7 @@ OTHER_SIMULATOR = "other_simulator"
 IN_EXUDYN = "impact-beam"
 """Machine that runs in Exudyn too."""
 
-SPLITS = ("train", "test", "outside", OTHER_SIMULATOR)
+SPLITS = ("train", "test", "outside", "corner", OTHER_SIMULATOR)
 
 ELSEWHERE = {
     "other_machines": "chaosgym/AnyMachine-v0 has it, and `chaosgym compare FILE` plays a machine's file",
@@ -102,6 +106,8 @@ class Variants:
         if self.split == "outside":
             row = int(generator.integers(2 * len(shares))) if number is None else number % (2 * len(shares))
             shares[row // 2] = (1.0 + generator.random()) * (1.0, -1.0)[row % 2]
+        elif self.split == "corner":
+            shares = np.copysign(1.0 + 0.5 * np.abs(shares), shares)
         elif self.split is not None:
             while in_test(shares) != (self.split != "train"):
                 shares = generator.uniform(-1.0, 1.0, len(shares))

@@ -23,6 +23,7 @@ from chaosgym.envs.machine_env import METADATA, EnvSettings, JobSpec, refuse_pic
 from chaosgym.envs.observation import Observation
 from chaosgym.envs.task import Status
 from chaosgym.errors import ParameterError
+from chaosgym.numbers import whole
 
 if TYPE_CHECKING:
     from chaosgym.envs.rendering import Dashboard
@@ -86,8 +87,8 @@ class MachineVectorEnv(JobSpec, gym.vector.VectorEnv[Observation, Actions, NDArr
                 f"render_mode = {render_mode!r} is not one of None, rgb_array; a window comes from a single environment"
             )
         for name, count in (("num_envs", num_envs), ("max_episode_steps", max_episode_steps)):
-            if count is not None and (isinstance(count, bool) or int(count) != count or count < 1):
-                raise ParameterError(f"{name} = {count!r} is out of range; allowed: whole numbers from 1 on")
+            if count is not None:
+                whole(name, count, 1)
         modes = [mode.value for mode in AutoresetMode]
         if autoreset_mode not in (*AutoresetMode, *modes):
             raise ParameterError(f"autoreset_mode = {autoreset_mode!r} is not one of {', '.join(modes)}")

@@ -9,7 +9,7 @@ from bokeh.models import ColumnDataSource, CustomJS, DataRange1d, Div, Toggle
 from bokeh.plotting import figure
 
 from chaosgym.arrays import Array
-from chaosgym.explore.point import FRAMES, View
+from chaosgym.explore.point import FRAMES, PointView
 from chaosgym.machines.picture import EDGE, INK, Shape, Sketch
 from chaosgym.plotting.style import NATURE_COLOURS
 
@@ -57,7 +57,7 @@ CALM = "if (matchMedia('(prefers-reduced-motion: reduce)').matches) button.activ
 """Holds the picture of those who asked their browser for little motion."""
 
 
-class Moving:
+class MovingSketch:
     """The picture and its button; nothing is asked of the server while it moves."""
 
     def __init__(self, document: Document) -> None:
@@ -74,7 +74,7 @@ class Moving:
         self._sources["words"].js_on_change("data", play)
         document.js_on_event("document_ready", CustomJS(args={"button": self._button}, code=CALM), play)
 
-    def show(self, view: View) -> None:
+    def show(self, view: PointView) -> None:
         """Follow a view; hide where there is no picture."""
         self.panel.visible = view.sketch is not None
         if view.sketch is None:

@@ -1,7 +1,8 @@
 """The page and its server on this computer: sliders, pictures that follow them, the verdict, the point as command."""
 
 import math
-from collections.abc import Callable
+from collections.abc import Callable, Iterable, Iterator
+from dataclasses import replace
 from functools import partial
 from html import escape
 from itertools import islice
@@ -28,12 +29,14 @@ from bokeh.plotting import figure
 from bokeh.server.server import Server
 
 from chaosgym.arrays import Array
+from chaosgym.diagnosis import CalmRegion
 from chaosgym.errors import ChaosgymError
-from chaosgym.explore.gate import guard
-from chaosgym.explore.moving import Moving
+from chaosgym.explore.beside import LOOKING, beside_of
+from chaosgym.explore.gate import guard, new_secret
+from chaosgym.explore.moving import MovingSketch
 from chaosgym.explore.playback import Playback
 from chaosgym.explore.point import (
-    View,
+    PointView,
     command_of,
     link_of,
     machine_from,
@@ -42,16 +45,19 @@ from chaosgym.explore.point import (
     sliders_of,
     view_of,
 )
+from chaosgym.explore.safe import calm_search
+from chaosgym.explore.saving import save_buttons
 from chaosgym.explore.worker import Worker
 from chaosgym.machines import MACHINES, Machine
 from chaosgym.machines.parameters import with_settings
+from chaosgym.plotting.labels import called
 from chaosgym.plotting.style import ACCENT, BAD, INK, MUTED, NATURE_COLOURS, PALE
 
 PAUSE = 15
 """Milliseconds for which movements of a slider are gathered before the page follows."""
 
 AT_ONCE = 4
-"""Speeds of the orbit diagram that are computed between two looks at the sliders."""
+"""Speeds of the orbit diagram, or runs of the calm region, that are computed between two looks at the sliders."""
 
 TOOLS = "pan,wheel_zoom,box_zoom,reset,save"
 
@@ -86,8 +92,15 @@ WRAPS = ":host { flex-wrap: wrap }"
 """Rows that become a column on a narrow page, and rows that go on in the next line."""
 
 TEMPLATE = """{% block preamble %}<meta name="viewport" content="width=device-width, initial-scale=1">
-<style>body { margin: 8px }</style>{% endblock %}
+<style>html { scrollbar-gutter: stable } body { margin: 8px }</style>{% endblock %}
 """
+
+HELP = (
+    "Drag a slider: pictures and verdict follow. Below, <em>Save picture</em> keeps them with the settings, "
+    "<em>Save command</em> the line that repeats them."
+)
+
+CALM_BY = "Type I: periodic throughout the tolerances of speed and clearance, by runs from rest."
 
 LABEL = """
 const roots = node => [...node.querySelectorAll('*')].flatMap(
@@ -117,7 +130,9 @@ class Page:
     def __init__(self, document: Document, machine: Machine) -> None:
         self._document, self.machine = document, machine
         self._waits = False
-        self._worker = Worker(document)
+        self._region: CalmRegion | None = None
+        self._search: Iterator[CalmRegion | None] | None = None
+        self._worker, self._searcher = Worker(document), Worker(document)
         self._sources = {
             "motion": ColumnDataSource({"time": [], "x": [], "v": [], "f": []}),
             "section": ColumnDataSource({"x": [], "v": []}),
@@ -128,30 +143,34 @@ class Page:
         self._stops = [BoxAnnotation(fill_color=MUTED, fill_alpha=0.25) for _ in range(4)]
         self._here = Span(dimension="height", line_color=BAD, line_width=2)
         self._verdict = Div(sizing_mode="stretch_width")
+        self._beside = Div(sizing_mode="stretch_width", name="beside")
+        self._heading = Div(sizing_mode="stretch_width", name="heading")
+        self._calm = Div(sizing_mode="stretch_width", name="calm")
         self._link = Div(visible=False, name="link")
         self._python = TextAreaInput(title="This point as Python", rows=5, sizing_mode="stretch_width", name="python")
         self._command = TextAreaInput(title="and as a command", rows=2, sizing_mode="stretch_width", name="command")
-        self._choice = Select(
-            title="machine", value=machine.name, options=list(dict.fromkeys([*MACHINES, machine.name]))
-        )
+        choices: list[Any] = [(name, name) for name in MACHINES if name != machine.name]
+        self._choice = Select(title="machine", value=machine.name, options=[*choices, (machine.name, called(machine))])
         self._choice.on_change("value", lambda name, old, new: self.show(MACHINES[new]()))
         self._panel = column(width=340, max_width=340)
-        self._moving = Moving(document)
+        self._moving = MovingSketch(document)
         self._playback = Playback(document, self.show)
-        document.title, document.template = "chaosgym explore", TEMPLATE
+        document.template = TEMPLATE
         document.js_on_event("document_ready", CustomJS(code=LABEL))
         document.add_root(self._layout())
         self.show(machine)
 
     def show(self, machine: Machine) -> None:
         """Go to a machine: its sliders, and everything that follows from them."""
-        self.machine = machine
+        self.machine, self._document.title = machine, f"{called(machine)} - chaosgym"
+        self._heading.text = f'<h1 style="font-size:1.4em;margin:0">{escape(called(machine))}</h1>'
         self._choice.update(value=machine.name)
         self._sliders = sliders_of(machine)
         self._widgets = [self._widget(place) for place in range(len(self._sliders))]
-        self._panel.children = [self._choice, *self._widgets, self._playback.panel(machine), self._verdict]
+        told = self._verdict, self._beside, self._calm
+        self._panel.children = [self._choice, *self._widgets, self._playback.panel(machine), *told]
         self._follow()
-        self._start_diagram()
+        self._restart()
 
     def _widget(self, place: int) -> Widget:
         slider = self._sliders[place]
@@ -176,24 +195,30 @@ class Page:
             self._waits = True
             self._document.add_timeout_callback(self._follow, PAUSE)
         if place > 0:
-            self._start_diagram()
+            self._restart()
 
     def _follow(self) -> None:
         """Let everything but the orbit diagram follow the machine."""
         self._waits = False
         self._worker.ask("view", partial(view_of, self.machine), self._show_view)
+        self._show_beside((LOOKING,))
+        self._searcher.ask("motions", partial(beside_of, self.machine), self._show_beside)
         self._link.text = link_of(self.machine)
         self._python.value, self._command.value = python_of(self.machine), command_of(self.machine)
         self._here.location = float(getattr(self.machine, self.machine.speed_field))
+        self._show_calm()
 
-    def _show_view(self, view: View) -> None:
+    def _show_view(self, view: PointView) -> None:
         self._draw(view)
         self._moving.show(view)
         colour = NATURE_COLOURS[view.nature]
-        lines = "".join(f'<p style="margin:0 0 8px">{escape(line)}</p>' for line in view.lines)
-        self._verdict.text = f'<h2 style="color:{colour};margin:4px 0 8px">{escape(view.headline)}</h2>{lines}'
+        headline = f'<h2 style="color:{colour};margin:4px 0 8px">{escape(view.headline)}</h2>'
+        self._verdict.text = headline + _paragraphs(view.lines)
 
-    def _draw(self, view: View) -> None:
+    def _show_beside(self, lines: tuple[str, ...]) -> None:
+        self._beside.text = _paragraphs(lines)
+
+    def _draw(self, view: PointView) -> None:
         millimetres = 1e3 * view.displacement
         self._sources["motion"].data = {
             "time": 1e3 * view.time,
@@ -210,8 +235,36 @@ class Page:
             place = view.room[side]
             box.update(**{field: 1e3 * place if math.isfinite(place) else None}, visible=math.isfinite(place))
 
+    def _restart(self) -> None:
+        """Begin anew what does not depend on the speed; it goes on piece by piece, and the sliders work meanwhile."""
+        self._start_diagram()
+        self._region, self._search = None, calm_search(self.machine, *self._sliders[:2])
+        self._show_calm()
+        self._more_calm()
+
+    def _more_calm(self) -> None:
+        search = self._search or iter(())
+        self._worker.ask("calm region", lambda: (search, list(islice(search, AT_ONCE))), self._take_calm)
+
+    def _take_calm(self, answer: tuple[Any, list[CalmRegion | None]]) -> None:
+        search, found = answer
+        if search is not self._search:
+            return
+        self._region = next((region for region in reversed(found) if region), self._region)
+        if found:
+            self._more_calm()
+        else:
+            self._search = None
+        if not found or any(found):
+            self._show_calm()
+
+    def _show_calm(self) -> None:
+        """Tell the calm region so far, with the speed that the machine has at present."""
+        lines = [] if self._region is None else replace(self._region, machine=self.machine).lines
+        lines += ["looking for calm speeds and clearances ..."] if self._search else [CALM_BY]
+        self._calm.text = f'<h3 style="margin:4px 0 8px">What is calm</h3>{_paragraphs(lines)}'
+
     def _start_diagram(self) -> None:
-        """Begin the orbit diagram anew; it fills speed by speed, and the sliders work meanwhile."""
         self._orbit = orbit_diagram(self.machine, self._sliders[0])
         self._sources["orbit"].data = {"speed": [], "peak": []}
         self._speed_axis.axis_label = self._sliders[0].label
@@ -266,6 +319,7 @@ class Page:
             portrait.add_layout(box)
         keep_link = CustomJS(args={"link": self._link}, code="history.replaceState(null, '', '?' + link.text)")
         self._link.js_on_change("text", keep_link)
+        self._figures = [moves, force, portrait, strobe, diagram, record]
         pictures = column(
             _row(moves, force),
             _row(portrait, strobe),
@@ -274,10 +328,11 @@ class Page:
             sizing_mode="stretch_width",
         )
         machine = column(self._moving.panel, self._panel, width=340, max_width=340)
-        return column(_row(machine, pictures), self._link, sizing_mode="stretch_width")
+        help_line = Div(text=HELP, sizing_mode="stretch_width")
+        return column(self._heading, help_line, _row(machine, pictures), self._link, sizing_mode="stretch_width")
 
     def _buttons(self) -> Any:
-        """Buttons that copy Python, command and link, and one that plays the impacts."""
+        """Buttons that save or copy the point, and one that plays the impacts."""
         buttons = []
         for label, source, code in (
             ("Copy Python", self._python, "text.value"),
@@ -287,9 +342,11 @@ class Page:
             button = Button(label=label, width=120)
             button.js_on_click(CustomJS(args={"text": source}, code=f"navigator.clipboard.writeText({code})"))
             buttons.append(button)
+        told = [self._heading, self._verdict, self._beside, self._calm]
+        saves = save_buttons(self._figures, told, self._command)
         listen = Button(label="Listen", width=120)
         listen.js_on_click(CustomJS(args={"motion": self._sources["motion"]}, code=LISTEN))
-        return row(*buttons, listen, stylesheets=[WRAPS])
+        return row(*saves, *buttons, listen, sizing_mode="stretch_width", stylesheets=[WRAPS])
 
 
 def _show_around(window: Range1d, dots: Array, moved: float) -> None:
@@ -298,6 +355,10 @@ def _show_around(window: Range1d, dots: Array, moved: float) -> None:
     middle = 0.5 * float(dots.min() + dots.max())
     ends = middle - half, middle + half
     window.update(start=ends[0], end=ends[1], reset_start=ends[0], reset_end=ends[1])
+
+
+def _paragraphs(lines: Iterable[str]) -> str:
+    return "".join(f'<p style="margin:0 0 8px">{escape(line)}</p>' for line in lines)
 
 
 def _row(*parts: Any) -> Any:
@@ -339,11 +400,10 @@ def serve(machine: Machine, port: int, ready: Callable[[str], object]) -> None:
         If the port is taken.
     """
     application = Application(FunctionHandler(partial(open_page, machine=machine)))
-    # only pages from localhost and this port may open its websocket, which is Bokeh's default
-    server: Any = Server({"/": application}, address=LOOPBACK, port=port)
+    server: Any = Server({"/": application}, address=LOOPBACK, port=port, prefix=new_secret())
     guard(server)
     server.start()
-    ready(f"http://localhost:{server.port}/?{link_of(machine)}")
+    ready(f"http://localhost:{server.port}{server.prefix}/?{link_of(machine)}")
     try:
         server.io_loop.start()
     finally:

@@ -3,27 +3,26 @@
 import shlex
 import time
 from collections.abc import Iterator, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any, NamedTuple
 
 import numpy as np
 
 from chaosgym.arrays import Array
 from chaosgym.classifier import classifier_for
-from chaosgym.diagnosis import MachineDiagnosis, attractors, diagnose
+from chaosgym.diagnosis import MachineDiagnosis, diagnose
 from chaosgym.errors import ChaosgymError, ParameterError, SimulationError
 from chaosgym.machines import FILE_ENDING, MACHINES, Machine
+from chaosgym.machines.accuracy import accuracy_of
 from chaosgym.machines.parameters import by_field, changes_of, parameters_of, with_settings
 from chaosgym.machines.picture import Sketch
 from chaosgym.plotting.labels import axis_label
 from chaosgym.recordings.monitor import Monitor
 from chaosgym.simulation import simulate
+from chaosgym.units import as_float
 
 BUDGET = 400
 """Cycles of the diagnosis: what is sure after some hundredths of a second."""
-
-STARTS = 16
-"""Random starts that look for other motions."""
 
 SHOWN_CYCLES, SAMPLES = 6, 300
 """Cycles of the time history and of the phase portrait, and samples of each."""
@@ -52,7 +51,7 @@ class Slider(NamedTuple):
 
 
 @dataclass(frozen=True)
-class View:
+class PointView:
     """What a point looks like.
 
     Attributes
@@ -72,7 +71,7 @@ class View:
     nature
         Of the verdict; "undetermined" where the motion could not be followed.
     headline, lines
-        Verdict and its evidence; the classifier; the monitor.
+        Verdict and its evidence; the classifier; the monitor. Other motions are looked for apart (``explore.beside``).
     """
 
     time: Array
@@ -124,7 +123,7 @@ def machine_from(name: str, settings: Mapping[str, str], served: str = "") -> Ma
     for field, text in by_field(MACHINES[name], settings).items():
         chosen = field in described and described[field].choices
         try:
-            values[field] = text if chosen else float(text)
+            values[field] = text if chosen else as_float(text)
         except ValueError:
             raise ParameterError(f"{field} = {text!r} is no number") from None
     return with_settings(MACHINES[name](), values)
@@ -148,24 +147,29 @@ def python_of(machine: Machine) -> str:
 
 
 def _python(line: str, made: str) -> str:
-    return f"import chaosgym\n{line}\n\nmachine = {made}\nprint(chaosgym.diagnose(machine))"
+    return f"import chaosgym\n{line}\n\nmachine = {made}\nprint(chaosgym.diagnose(machine).words)"
 
 
 def command_of(machine: Machine) -> str:
     """Command line that diagnoses a machine."""
-    settings = [part for name, value in changes_of(machine).items() for part in ("--set", f"{name}={value}")]
-    return shlex.join(["chaosgym", "diagnose", machine.name, *settings])
+    changes = changes_of(machine)
+    settings = [part for name, value in changes.items() for part in ("--set", f"{name}={value}")]
+    stated = len(machine.fidelity_ladder) < 2 or machine.rung is None or set(machine.model_fields) & set(changes)
+    rung = [] if stated else ["--fidelity", str(machine.rung)]
+    return shlex.join(["chaosgym", "diagnose", machine.name, *settings, *rung])
 
 
-def view_of(machine: Machine) -> View:
+def view_of(machine: Machine) -> PointView:
     """Everything that is shown of a point; a failed simulation is shown, not raised."""
     try:
-        _check_cost(machine)
+        check_cost(machine)
         verdict = diagnose(machine, budget=BUDGET)
     except (SimulationError, ParameterError) as error:
         nothing = np.zeros(0)
         shown = (nothing,) * 4
-        return View(*shown, np.zeros((0, 2)), nothing, machine.room, "undetermined", "can't be followed", (str(error),))
+        return PointView(
+            *shown, np.zeros((0, 2)), nothing, machine.room_of(), "undetermined", "can't be followed", (str(error),)
+        )
     judged = verdict.judged
     cycles = min(SHOWN_CYCLES, len(judged))
     last = simulate(machine, cycles, judged.section[-cycles], samples_per_cycle=SAMPLES).of_joint(judged.joint_name)
@@ -174,7 +178,7 @@ def view_of(machine: Machine) -> View:
     sketched = min(SKETCHED, cycles)
     rows = len(motion) - sketched * SAMPLES + np.arange(FRAMES) * sketched * SAMPLES // FRAMES
     heard = simulate(machine, MONITORED_CYCLES, judged.section[-1]).peak_force[:, judged.worst_side]
-    return View(
+    return PointView(
         time=last.time,
         displacement=motion[:, 0],
         velocity=motion[:, 1],
@@ -185,33 +189,31 @@ def view_of(machine: Machine) -> View:
         nature=verdict.nature,
         headline=verdict.statement.headline,
         lines=(
-            *_with_others(machine, verdict).statement.lines()[1:],
+            *replace(verdict, searched="").statement.lines()[1:],
             _votes(verdict),
             _classified(machine),
             _watched(heard),
+            *_modelled(machine),
         ),
         sketch=machine.sketch(last, rows, float(np.abs(motion[:, 2]).max()) or 1.0),
         span=sketched * machine.cycle_period,
     )
 
 
-def _with_others(machine: Machine, verdict: MachineDiagnosis) -> MachineDiagnosis:
-    """The verdict with the other motions of a machine whose response repeats, and how far was looked."""
-    if verdict.nature != "periodic":
-        return verdict
-    return attractors(machine, starts=STARTS, budget=BUDGET, centre=verdict).told_of(verdict)
+def check_cost(machine: Machine, most: float = MOST_SECONDS) -> None:
+    """Refuse a machine of which a cycle takes more than ``most`` seconds of processor time: the page would not follow.
 
-
-def _check_cost(machine: Machine) -> None:
-    """Refuse a machine of which a few hundred cycles would take minutes."""
+    Raises
+    ------
+    SimulationError
+        If it does, or can't be followed.
+    """
     for _ in range(2):  # the first one may compile
         began = time.thread_time()
         simulate(machine, 1)
-        if (took := time.thread_time() - began) < MOST_SECONDS:
+        if (took := time.thread_time() - began) < most:
             return
-    raise SimulationError(
-        f"a cycle takes {took:.2g} s; allowed here: {MOST_SECONDS} s; `chaosgym diagnose` takes its time"
-    )
+    raise SimulationError(f"a cycle takes {took:.2g} s; allowed here: {most} s; `chaosgym diagnose` takes its time")
 
 
 def _votes(verdict: MachineDiagnosis) -> str:
@@ -226,22 +228,33 @@ def _votes(verdict: MachineDiagnosis) -> str:
 
 
 def _classified(machine: Machine) -> str:
+    """What the classifier says of the machine by the model that it was trained on."""
     try:
-        answer = classifier_for(machine).classify(machine, types=False)
+        classifier = classifier_for(machine)
+        fields = set(machine.model_fields) & set(parameters_of(machine))
+        trained = {name: getattr(classifier.machine, name) for name in fields}
+        answer = classifier.classify(with_settings(machine, trained), types=False)
     except ChaosgymError as error:
         return f"classifier: {error}"
     centre = answer.centre
     if centre.nature is None:
         return f"classifier: no answer: {centre.reason}"
     how = "proven" if centre.proven else f"probability {centre.probability:.2f}"
-    return f"classifier: {centre.nature}, {how} by {centre.stage}"
+    rung = classifier.machine.rung
+    model = f", of the {rung} model" if rung and machine.rung != rung else ""
+    return f"classifier: {centre.nature}{model}, {how} by {centre.stage}"
+
+
+def _modelled(machine: Machine) -> tuple[str, ...]:
+    """The machine's model and its estimated error here, and whether that is more than is documented."""
+    accuracy = accuracy_of(machine)
+    return tuple(filter(None, (accuracy.line, accuracy.warning)))
 
 
 def _watched(peaks: Array) -> str:
-    seen = list(Monitor(SENSOR_ERROR).watch(peaks))
-    last = seen[-1]
-    state = {None: "waiting", False: "regular", True: "ALARM: irregular"}[last.alarm]
-    return f"monitor with a ±{SENSOR_ERROR:g} N sensor: {state}, level {last.level:.2f}"
+    last = list(Monitor(SENSOR_ERROR).watch(peaks))[-1]
+    does = "ALARM: irregular" if last.alarm else "no alarm"
+    return f"monitor with a ±{SENSOR_ERROR:g} N sensor: {does} in {len(peaks)} cycles"
 
 
 def orbit_diagram(machine: Machine, slider: Slider) -> Iterator[tuple[float, Array]]:

@@ -4,8 +4,8 @@ import numpy as np
 from scipy.stats import qmc
 
 from chaosgym.arrays import Array
-from chaosgym.errors import ParameterError
 from chaosgym.machines import Machine
+from chaosgym.numbers import whole
 from chaosgym.series.two_step import two_step_test
 from chaosgym.simulation import simulate
 
@@ -18,8 +18,7 @@ MAX_DRAWS = 20
 
 def operating_points(machine: Machine, count: int) -> Array:
     """Speeds and clearances over the usual ranges, (count, 2): a Halton sequence, even in the logarithm."""
-    if count < 1:
-        raise ParameterError(f"points = {count} is out of range; allowed: 1 or more")
+    whole("points", count, 1, 10**6)
     low, high = np.log([machine.usual_ranges[f] for f in (machine.speed_field, machine.clearance_field)]).T
     spread = qmc.Halton(2, scramble=False).random(count + 1)[1:]
     return np.asarray(np.exp(low + spread * (high - low)))
@@ -37,7 +36,7 @@ def balanced_points(machine: Machine, count: int) -> Array:
         if not any(wanted.values()):
             break
         record = simulate(machine.at(*point.tolist()), 100, transient=100)
-        chaotic = two_step_test(record).nature == "chaotic"
+        chaotic = two_step_test(record).labelled("thesis").nature == "chaotic"
         if wanted[chaotic] > 0:
             wanted[chaotic] -= 1
             chosen.append(point)

@@ -19,21 +19,23 @@ import math
 import time
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 from scipy.stats import wasserstein_distance
 
 from chaosgym.arrays import Array
-from chaosgym.design.improve import not_dominated
+from chaosgym.design.trials import not_dominated
 from chaosgym.diagnosis.response_type import SHARES, default_tolerances
 from chaosgym.diagnosis.type_rule import Neighbour, judge_type
 from chaosgym.errors import ChaosgymError
 from chaosgym.fidelity.sample import balanced_points
 from chaosgym.machines import Machine
 from chaosgym.machines.parameters import with_settings
+from chaosgym.plain import Result
 from chaosgym.series.two_step import two_step_test
-from chaosgym.simulation import CycleRecord, ExactEvents, Integrator, RungeKutta4, parallel_map, simulate
+from chaosgym.simulation import CycleRecord, ExactEvents, Integrator, RungeKutta4, simulate
+from chaosgym.simulation.parallel import parallel_map
 
 REFERENCE = "reference"
 """Rung that all others are measured against."""
@@ -67,7 +69,7 @@ class Setting(NamedTuple):
 
 
 @dataclass(frozen=True, kw_only=True)
-class TradeoffRow:
+class TradeoffRow(Result):
     """What a setting costs and how far it is from the reference. Errors are shares of the reference's value.
 
     Attributes
@@ -107,18 +109,19 @@ class TradeoffRow:
     points: int
     on_front: bool = False
 
-    def as_dict(self) -> dict[str, Any]:
-        """Return plain values for JSON."""
-        return dict(vars(self))
-
 
 @dataclass(frozen=True)
-class Tradeoff:
+class Tradeoff(Result):
     """The ladder of a machine measured.
 
     ``costs`` are microseconds per cycle of scenes at the machine's own rung; ``noise`` is the Wasserstein distance, as
     a share of the mean, between two halves of the reference's run at chaotic points, ``chaotic`` the number of these.
     """
+
+    shows = (
+        "machine rows microseconds_per_cycle_of_scenes=costs refused points chaotic_points=chaotic "
+        "noise_at_chaotic_points=noise"
+    )
 
     machine: str
     rows: tuple[TradeoffRow, ...]
@@ -127,18 +130,6 @@ class Tradeoff:
     points: Array
     chaotic: int
     noise: float | None
-
-    def as_dict(self) -> dict[str, Any]:
-        """Return plain values for JSON."""
-        return {
-            "machine": self.machine,
-            "rows": [row.as_dict() for row in self.rows],
-            "microseconds_per_cycle_of_scenes": dict(self.costs),
-            "refused": dict(self.refused),
-            "points": self.points.tolist(),
-            "chaotic_points": self.chaotic,
-            "noise_at_chaotic_points": self.noise,
-        }
 
 
 class _Point(NamedTuple):
@@ -224,7 +215,7 @@ def settings_of(machine: Machine) -> list[Setting]:
     """Every rung by exact events, and the default rung by Runge-Kutta's method at every step."""
     rungs = list(machine.fidelity_ladder)
     default = type(machine)().rung or REFERENCE
-    fixed = with_settings(machine, {"fidelity": default}).runs_fixed_steps
+    fixed = with_settings(machine, {"fidelity": default}).moving.fixed_steps
     return [Setting(rung, "exact", EXACT_STEP) for rung in rungs] + [
         Setting(default, "Runge-Kutta 4", step) for step in FIXED_STEPS if fixed
     ]
@@ -269,7 +260,7 @@ def _at_point(machine: Machine, setting: Setting, cycles: int, transient: int) -
         return record
 
     centre = settled(machine)
-    nature = two_step_test(centre).nature
+    nature = two_step_test(centre).labelled("thesis").nature
     neighbours = []
     if nature == "periodic":
         fields = (machine.speed_field, machine.clearance_field)
@@ -277,7 +268,8 @@ def _at_point(machine: Machine, setting: Setting, cycles: int, transient: int) -
             for share in SHARES if name in fields else ():
                 record = settled(with_settings(machine, {name: tolerance.at(getattr(machine, name), share)}))
                 peak = float(record.peak_force.max())
-                neighbours.append(Neighbour({name: share}, two_step_test(record).nature, peak))
+                nature_there = two_step_test(record).labelled("thesis").nature
+                neighbours.append(Neighbour({name: share}, nature_there, peak))
     kind = judge_type(nature, float(centre.peak_force.max()), neighbours)[0]
     return _Point(centre.peak_force.ravel(), nature, kind, seconds, count)
 

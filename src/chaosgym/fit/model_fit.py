@@ -28,17 +28,20 @@ from chaosgym.diagnosis.diagnose import diagnose_alone
 from chaosgym.errors import DiagnosisError
 from chaosgym.fit.model_draws import (
     AFRESH,
+    TRANSIENT,
     Draw,
     Prior,
     compared,
+    figures,
+    names_of,
     near,
     other_start,
     prior_of,
     simulated,
     weights_of,
 )
-from chaosgym.fit.record_figures import figures, names_of
 from chaosgym.machines.machine import Machine
+from chaosgym.plain import Result
 from chaosgym.recordings.judge import unsteady
 from chaosgym.recordings.measured_verdict import MeasuredVerdict
 from chaosgym.series.noise import repair, stated_error
@@ -84,7 +87,7 @@ class Estimate(NamedTuple):
 
 
 @dataclass(frozen=True)
-class ModelFit:
+class ModelFit(Result):
     """What the model says of a record.
 
     Attributes
@@ -124,17 +127,6 @@ class ModelFit:
     def words(self) -> str:
         """Nature and period, such as "periodic, period 2"."""
         return f"{self.nature}, period {self.period}" if self.period else self.nature
-
-    def as_dict(self) -> dict[str, Any]:
-        """Return plain values for JSON."""
-        plain = {name: getattr(self, name) for name in self.__dataclass_fields__}
-        return {
-            **plain,
-            "shares": dict(self.shares),
-            "noise": dict(self.noise),
-            "difference": self.difference if math.isfinite(self.difference) else None,
-            "estimates": {name: one._asdict() for name, one in self.estimates.items()},
-        }
 
 
 def with_record(found: ModelFit, alone: MeasuredVerdict) -> ModelFit:
@@ -242,6 +234,20 @@ def model_fit(
     if not draws:
         raise DiagnosisError(f"no machine of {machine.name} within the tolerances can be simulated")
     return _concluded(prior, draws, proposals, names_of(measured.shape[1])[0], wanted)
+
+
+def usual_cycles(machine: Machine, estimate: Sequence[str] = ()) -> int:
+    """Cycles that a comparison of a long record with a machine takes; twice as many where few draws agree with it.
+
+    Examples
+    --------
+    >>> from chaosgym.fit.model_fit import usual_cycles
+    >>> beam = chaosgym.ImpactBeam()
+    >>> usual_cycles(beam) < usual_cycles(beam, ["clearance"])
+    True
+    """
+    draws = (FIRST << len(prior_of(machine, estimate).wide)) + LATER * (ROUNDS - 1)
+    return draws * (TRANSIENT + MOST_CYCLES)
 
 
 def _checked(peaks: ArrayLike) -> Array:

@@ -1,6 +1,6 @@
 """What does a machine's model say of a file? The record's columns beside the machine, and the record alone."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -12,13 +12,15 @@ from chaosgym.fit.model_draws import fields_to_estimate
 from chaosgym.fit.model_fit import Estimate, ModelFit, model_fit, with_record
 from chaosgym.machines.machine import Machine
 from chaosgym.machines.parameters import parameters_of
+from chaosgym.plain import Result
 from chaosgym.recordings.judge import judge_peaks
-from chaosgym.recordings.runs import RecordingOptions, Run, judged_runs
+from chaosgym.recordings.kind import RecordingOptions
+from chaosgym.recordings.runs import Run, judged_runs
 from chaosgym.series.noise import stated_error
 
 
 @dataclass(frozen=True)
-class RecordFit:
+class RecordFit(Result):
     """A file beside a machine.
 
     Attributes
@@ -31,20 +33,17 @@ class RecordFit:
         What the model says of them.
     """
 
+    shows = "machine=machine.name records=runs"
+
     machine: Machine
     runs: tuple[Run, ...]
     fit: ModelFit
 
     def as_dict(self) -> dict[str, Any]:
         """Return plain values for JSON."""
-        return {
-            "machine": self.machine.name,
-            "file": self.runs[0].source,
-            "columns": [run.name for run in self.runs],
-            **self.fit.as_dict(),
-            "records": [run.as_dict() for run in self.runs],
-            "warnings": [] if self.fit.nature != "undetermined" else [self.fit.reason],
-        }
+        file = {"file": self.runs[0].source, "columns": [run.name for run in self.runs]}
+        warnings = [] if self.fit.nature != "undetermined" else [self.fit.reason]
+        return {**super().as_dict(), **file, **self.fit.as_dict(), "warnings": warnings}
 
 
 def fit_record(
@@ -53,6 +52,7 @@ def fit_record(
     options: RecordingOptions | None = None,
     *,
     estimate: Sequence[str] = (),
+    begin: Callable[[], object] = lambda: None,
 ) -> RecordFit:
     """Compare the columns of a file with what a machine does within its tolerances.
 
@@ -66,6 +66,8 @@ def fit_record(
         What is stated of it.
     estimate
         Fields of the machine to estimate, as for ``model_fit``.
+    begin
+        Is called once the file is read, before what takes long.
 
     Raises
     ------
@@ -80,6 +82,7 @@ def fit_record(
     if len(runs) > 1 and not all(run.aligned for run in runs):
         raise DiagnosisError(f"{runs[0].source}: cycles were left out of one column; compare one column at a time")
     peaks = np.column_stack([run.peaks for run in runs])
+    begin()
     fit = model_fit(
         machine,
         peaks,

@@ -4,6 +4,8 @@ from collections.abc import Iterator, Mapping
 from importlib import import_module
 from typing import TYPE_CHECKING, Any
 
+from chaosgym.errors import nearest_or
+
 if TYPE_CHECKING:
     from chaosgym.machines.impact_beam import ImpactBeam
     from chaosgym.machines.machine import Machine
@@ -40,10 +42,7 @@ class MachineRegistry(Mapping[str, "type[Machine]"]):
 
     def listed(self, name: object) -> str:
         """End of a message about a name that is not known: the nearest one, or all, and that a file does too."""
-        from difflib import get_close_matches
-
-        near = get_close_matches(str(name), self, n=1)
-        return f"did you mean {near[0]}?" if near else f"known: {', '.join(sorted(self))}, or a file my-machine.toml"
+        return nearest_or(f"known: {', '.join(sorted(self))}, or a file my-machine.toml", name, self)
 
     def class_name(self, name: str) -> str:
         """Name of a machine's class, such as ``ImpactBeam``, without importing it."""

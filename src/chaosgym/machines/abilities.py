@@ -1,17 +1,36 @@
 """What only some machines can do or tell; the defaults are the answers of all others."""
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from typing import TYPE_CHECKING, Any, ClassVar, NamedTuple, Self
 
 import numpy as np
 from numpy.typing import NDArray
 
 from chaosgym.arrays import Array
+from chaosgym.core.matrices import product
 from chaosgym.errors import ParameterError
 
 if TYPE_CHECKING:
     from chaosgym.machines.drive_torque import DriveTorque
     from chaosgym.machines.picture import Sketch
+
+
+class FreeBodies(NamedTuple):
+    """What holds the free bodies among n mass-normalised modes.
+
+    Attributes
+    ----------
+    rigid : (n,)
+        Which modes have no stiffness.
+    damping : (n, n)
+        D [1/s] of all modes.
+    rows : (m, n)
+        What each joint, each spring beside the modes and each surface that rubs moves for a mode.
+    """
+
+    rigid: NDArray[np.bool_]
+    damping: NDArray[np.float64]
+    rows: NDArray[np.float64]
 
 
 class Flexible(NamedTuple):
@@ -27,6 +46,8 @@ class Flexible(NamedTuple):
         Modal forces of cosine and sine of each harmonic of the speed, from the first on [N kg^-1/2].
     static : (n,)
         The constant one [N kg^-1/2].
+    points
+        What each named point that is no joint moves for a mode, (n,).
     """
 
     stiffness: NDArray[np.float64]
@@ -34,22 +55,113 @@ class Flexible(NamedTuple):
     joints: NDArray[np.float64]
     drive: NDArray[np.float64]
     static: NDArray[np.float64]
+    points: Mapping[str, NDArray[np.float64]] = {}
+
+
+class Kinematics(NamedTuple):
+    """How joints and named points move with n coordinates, and how these answer an impulse.
+
+    Attributes
+    ----------
+    mobility : (n, n)
+        Change of all velocities by a unit impulse along each coordinate, at the start of a cycle: the inverse of the
+        mass matrix.
+    places
+        Displacement (n,) per unit coordinate of joints and, on machines of modes, of the points of their shapes.
+    stops
+        Displacement (n,) of each contact per unit coordinate, and the distance [m] to its farthest stop.
+    """
+
+    mobility: NDArray[np.float64]
+    places: Mapping[str, NDArray[np.float64]]
+    stops: list[tuple[Array, float]]
+
+    @property
+    def unit_knocks(self) -> Mapping[str, Array]:
+        """Change of the velocities (n,) that changes that of a place by 1, by an impulse along its motion, by place."""
+        impulses = {place: (row, product(self.mobility, row)) for place, row in self.places.items() if row.any()}
+        return {place: answer / float(product(row, answer)) for place, (row, answer) in impulses.items()}
+
+
+class BendingPart(NamedTuple):
+    """A part of a machine that bends.
+
+    Attributes
+    ----------
+    stress
+        Stress (f, n) [Pa] at the outer fibres for each coordinate, pull above zero. It asks for the position [m] of the
+        section from the part's beginning on, and for the distance [m] of the outer fibres from the neutral one, which
+        a machine's own beam knows.
+    showing
+        The machine whose time histories show a row (n,) of its coordinates in place of the joint's displacement; None
+        where the modes of ``flexible`` tell the stress over time.
+    """
+
+    stress: Callable[[float, float], Array]
+    showing: Callable[[Array], Any] | None = None
+
+
+class Propagation(NamedTuple):
+    """How a machine moves between two changes of contact.
+
+    Attributes
+    ----------
+    how
+        In words, and what that leaves.
+    deviations
+        Whether ``run`` takes ``tangents``, so that Lyapunov exponents and derivatives of orbits are exact.
+    costly
+        Whether a derivative of ``run`` costs several runs, as without deviations.
+    fixed_steps
+        Whether ``run`` takes ``RungeKutta4``.
+    """
+
+    how: str = "exact propagation between contacts"
+    deviations: bool = True
+    costly: bool = False
+    fixed_steps: bool = True
+
+
+MOST_MODELS = 4
+"""Models that a tolerance may choose from, where a machine names no others."""
 
 
 class Abilities:
     """Optional part of the protocol ``Machine``."""
 
     name: ClassVar[str]
+    model_fields: ClassVar[tuple[str, ...]] = ()
+    """Fields that a tolerance chooses: they decide accuracy alone."""
+    documented_errors: ClassVar[Mapping[str, float]] = {}
+    """Error of the peak force, as a share, that the documentation states of rungs."""
 
     @property
-    def carries_deviations(self) -> bool:
-        """True if ``run`` takes ``tangents``, so that Lyapunov exponents and derivatives of orbits are exact."""
-        return False
+    def model_numbers(self) -> Mapping[str, float]:
+        """What tells this model from coarser and finer ones, such as its number of modes."""
+        return {name: getattr(self, name) for name in self.model_fields}
 
     @property
-    def runs_fixed_steps(self) -> bool:
-        """True if ``run`` takes ``RungeKutta4``."""
-        return True
+    def finer(self) -> "Self | None":
+        """The same machine by a model so much finer that the difference tells the error of this one; None without."""
+        return None
+
+    @property
+    def models(self) -> "tuple[Self, ...]":
+        """The same machine by each model that a tolerance may choose, the cheapest first."""
+        chain = [self]
+        while len(chain) < MOST_MODELS and (finer := chain[-1].finer) is not None:
+            chain.append(finer)
+        return tuple(chain)
+
+    @property
+    def left_out(self) -> str:
+        """Error that no ``finer`` model tells of, as a sentence; empty if there is none."""
+        return ""
+
+    @property
+    def moving(self) -> Propagation:
+        """How it moves; by default without deviations."""
+        return Propagation(deviations=False, costly=True)
 
     @property
     def mirrors(self) -> bool:
@@ -93,6 +205,14 @@ class Abilities:
         """``flexible``, where friction is left out of the equations."""
         return self.flexible
 
+    @property
+    def free_bodies(self) -> FreeBodies | None:
+        """What holds its free bodies, if it is one of a few modes."""
+        equations = self.without_friction
+        if equations is None:
+            return None
+        return FreeBodies(equations.stiffness == 0.0, equations.damping, equations.joints)
+
     def shape_of(self, place: str) -> Array:
         """Mode shapes (n,) at a named point, or of a motion between two, such as ``pinion - wheel``.
 
@@ -104,74 +224,9 @@ class Abilities:
         raise ParameterError(f"{self.name} has no named points; allowed: the file of a machine of modes or matrices")
 
     @property
-    def bending_links(self) -> tuple[str, ...]:
-        """Names of the links whose sections may be asked for by ``fibre_stress``."""
-        return ()
-
-    def fibre_stress(self, link: str, position: float, fibre: float) -> Array:
-        """Stress (f, n) [Pa] at the outer fibres of a link that bends, for each coordinate, pull above zero.
-
-        Parameters
-        ----------
-        link
-            Its name.
-        position
-            Of the section [m] from the link's beginning on.
-        fibre
-            Distance [m] of the outer fibres from the neutral one.
-
-        Raises
-        ------
-        ParameterError
-            If the machine has no such link, or the position is outside it.
-        """
-        raise ParameterError(f"{self.name} has no links that bend; allowed: the file of a mechanism with a beam")
-
-    def showing(self, row: Array) -> Self:
-        """The machine whose time histories show a row (n,) of its coordinates in place of the joint's displacement.
-
-        Raises
-        ------
-        ParameterError
-            If the machine has no ``bending_links``.
-        """
-        raise ParameterError(f"{self.name} has no links that bend; allowed: the file of a mechanism with a beam")
-
-    def stress_at(self, position: float) -> Array:
-        """Bending stress (n,) at the outer fibre of its beam for each mode, at a position [m] from its beginning on.
-
-        It is E c phi'' [Pa kg^-1/2 m^-1], positive where the upper fibre is pulled.
-
-        Raises
-        ------
-        ParameterError
-            If the machine has no beam of its own, or the position is outside it.
-        """
-        raise ParameterError(f"{self.name} has no beam of its own; allowed: impact-beam, or a link that bends")
-
-    def draw(self, panel: Any, record: Any, colour: str, moment: float, force_limit: float) -> None:
-        """Draw the machine in motion.
-
-        Parameters
-        ----------
-        panel
-            Axes of matplotlib.
-        record
-            ``CycleRecord`` of a run, with its time history.
-        colour
-            Of what tells how the step went: calm, or of Type III.
-        moment
-            Of the last cycle, from 0 to 1.
-        force_limit
-            Force [N] to which pictures scale.
-        """
-        from chaosgym.machines.picture import draw_displacement, draw_sketch, sample_at
-
-        sketch = self.sketch(record, np.array([sample_at(record, moment)]), force_limit)
-        if sketch is None:
-            draw_displacement(panel, record, colour, moment)
-        else:
-            draw_sketch(panel, sketch, colour)
+    def bending_parts(self) -> Mapping[str, BendingPart]:
+        """Parts that bend, by the name of their link; "" is the machine's own beam."""
+        return {}
 
     def sketch(self, record: Any, rows: NDArray[np.int64], force_limit: float) -> "Sketch | None":
         """The machine at some moments, as shapes and words; None if it has no picture.
@@ -187,12 +242,6 @@ class Abilities:
         """
         return None
 
-    def draw_poses(self, panels: Any) -> None:
-        """Draw the machine at equal steps of its cycle, one in each of the panels of matplotlib.
-
-        Raises
-        ------
-        ParameterError
-            If it has no such picture.
-        """
-        raise ParameterError(f"{self.name} has no picture of its links; allowed: the file of a mechanism")
+    def draw_poses(self, panels: Any) -> bool:
+        """Draw the machine at equal steps of its cycle, one in each of the panels of matplotlib; False if it can't."""
+        return False

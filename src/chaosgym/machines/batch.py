@@ -16,7 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from chaosgym.arrays import Array, Indices
-from chaosgym.core import status
+from chaosgym.core import matrices, status
 from chaosgym.core.batch import Motions, Settings, TablesOfMany, advance_beams
 from chaosgym.core.compilation import call_side_by_side
 from chaosgym.core.cycle import CycleArrays
@@ -172,7 +172,7 @@ class VaryingBatch(CompiledBatch):
     def start(self, i: int, machine: BatchedMachine) -> None:
         """Put a machine at rest into place i."""
         super().start(i, machine)
-        self._deviations[i] = np.cos(1.0 + np.arange(self._deviations.shape[2]))
+        self._deviations[i] = matrices.cos(1.0 + np.arange(self._deviations.shape[2]))
 
     def run_varied(self, which: Indices, speeds: Array) -> tuple[Cycles, Array]:
         """Run the machines ``which`` (k,) for a cycle at each of the ``speeds`` (k, cycles), in the speed field's unit.

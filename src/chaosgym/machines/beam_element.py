@@ -14,6 +14,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from chaosgym.arrays import Array
+from chaosgym.core import matrices
+from chaosgym.core.matrices import product
 
 Matrix = NDArray[np.float64]
 
@@ -92,10 +94,10 @@ def interpolation(lengths: Matrix) -> Interpolation:
     h = lengths[:, None]
     flat = np.ones_like(h)
     deflection = [
-        flat * (1 - 3 * x**2 + 2 * x**3),
-        h * (x - 2 * x**2 + x**3),
-        flat * (3 * x**2 - 2 * x**3),
-        h * (x**3 - x**2),
+        flat * (1 - 3 * x**2 + 2 * x * x * x),
+        h * (x - 2 * x**2 + x * x * x),
+        flat * (3 * x**2 - 2 * x * x * x),
+        h * (x * x * x - x**2),
     ]
     turn = [6 * (x**2 - x) / h, flat * (1 - 4 * x + 3 * x**2), 6 * (x - x**2) / h, flat * (3 * x**2 - 2 * x)]
     shape = np.zeros((count, len(x), 2 * count + 2))
@@ -163,17 +165,17 @@ def fitted_modes(angular: Array, coupling: Array, count: int) -> tuple[Array, Ar
     flexibility = (slowest / angular) ** 2
     basis = np.empty((len(angular), count))
     column = coupling * slowest / angular
-    least = 1e-14 * float(np.linalg.norm(column))
+    least = 1e-14 * float(matrices.norm(column))
     for k in range(count):
         for _ in range(2):
-            column = column - basis[:, :k] @ (basis[:, :k].T @ column)
-        size = np.linalg.norm(column)
+            column = column - product(basis[:, :k], product(basis[:, :k].T, column))
+        size = matrices.norm(column)
         if size <= least:
             raise np.linalg.LinAlgError(f"only {k} of {count} fitted modes are independent")
         basis[:, k], least = column / size, 1e-14
         column = basis[:, k] * flexibility
-    inverse_squares, turn = np.linalg.eigh(basis.T @ (basis * flexibility[:, None]))
+    inverse_squares, turn = matrices.eigh(product(basis.T, basis * flexibility[:, None]))
     if inverse_squares[0] <= 1e-14 * inverse_squares[-1]:
         raise np.linalg.LinAlgError("rounding hides the fastest of the fitted modes")
     fitted = slowest / np.sqrt(inverse_squares[::-1])
-    return fitted, (basis @ turn[:, ::-1]) * fitted / angular[:, None]
+    return fitted, product(basis, turn[:, ::-1]) * fitted / angular[:, None]

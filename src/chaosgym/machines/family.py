@@ -5,6 +5,7 @@ put into SI. All have as many modes, so that one compiled batch holds them; thos
 are assumed.
 """
 
+import math
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -48,7 +49,7 @@ def drawn_machine(kind: str, generator: np.random.Generator) -> Ranged:
 
 def _about(generator: np.random.Generator, low: float, high: float) -> float:
     """A positive number whose logarithm is uniform."""
-    return float(np.exp(generator.uniform(np.log(low), np.log(high))))
+    return math.exp(generator.uniform(math.log(low), math.log(high)))
 
 
 def _structure(kind: str, rng: np.random.Generator) -> Ranged:

@@ -1,5 +1,6 @@
 """Keys of machines' files: unit and meaning of each, from which reader, messages and JSON schema are made."""
 
+import math
 from collections.abc import Callable, Mapping
 from typing import Any, NamedTuple
 
@@ -7,15 +8,17 @@ import numpy as np
 
 from chaosgym.errors import ParameterError
 from chaosgym.machines.parameters import suggestion
-from chaosgym.numbers import shown
-from chaosgym.units import parse_quantity, parse_row, units_of
+from chaosgym.numbers import number, shown
+from chaosgym.units import check_share, parse_quantity, parse_row, units_of
 
 
 class Key(NamedTuple):
     """What stands behind a key.
 
-    ``about`` it; ``unit`` of a quantity; ``kind`` "quantity", "row", "rows", "text", "texts", "count" or "flag";
-    ``choices`` of a text; ``bare`` if numbers without a unit mean something.
+    ``about`` it; ``unit`` of a quantity; ``kind`` "quantity", "row", "rows", "text", "texts", "count", "flag"
+    or "state", a row that is read once the machine is known;
+    ``choices`` of a text; ``bare`` if numbers without a unit mean something; ``share`` if it is usually written in %;
+    ``low`` and ``high`` bound every number, in its unit.
     """
 
     about: str
@@ -23,6 +26,9 @@ class Key(NamedTuple):
     kind: str = "quantity"
     choices: tuple[str, ...] = ()
     bare: bool = False
+    share: bool = False
+    low: float = -math.inf
+    high: float = math.inf
 
 
 TEXT = "text"
@@ -30,7 +36,11 @@ TEXT = "text"
 AS_GIVEN = ("tolerances", "job")
 """Tables whose values are taken as they are: what they mean is known once the machine is."""
 
-INITIAL_STATE = Key("displacements, then velocities, of all coordinates in SI units; rest if left out", kind="row")
+INITIAL_STATE = Key(
+    "displacements, then velocities, of all coordinates in SI units; beside modal_masses with units, such as "
+    "'1 mm, 0 m/s'; rest if left out",
+    kind="state",
+)
 """Of the table "operation" of all files."""
 
 OPERATION: Mapping[str, Mapping[str, Key]] = {
@@ -114,11 +124,14 @@ class Keys(NamedTuple):
     def _value(self, name: str, given: Any, key: Key) -> Any:
         """Value of a key; a unit that does not fit is told of."""
         try:
-            return _parsed(name, given, key._replace(unit=self.unit_of(name, given, key)))
+            value = _parsed(name, given, key._replace(unit=self.unit_of(name, given, key)))
         except ParameterError as error:
             _, found, unit = str(error).partition(" has the unknown unit '")
             told = self.misfit(unit.partition("'")[0]) if found else ""
             raise ParameterError(f"{error}{told}") from None
+        for each in np.ravel(value) if math.isfinite(key.high) else ():
+            number(name, each, key.low, key.high, key.unit.strip("-"))
+        return value
 
     def schema(self) -> dict[str, Any]:
         """JSON schema of such a file."""
@@ -149,6 +162,7 @@ class Keys(NamedTuple):
         shapes: dict[str, Any] = {
             "quantity": one,
             "row": {"anyOf": [text, *number, {"type": "array", "items": one}]},
+            "state": {"anyOf": [text, *number, {"type": "array", "items": one}]},
             "rows": {"type": "array", "items": {"anyOf": [text, {"type": "array", "items": one}]}},
             "text": {"type": "string", "enum": list(key.choices)} if key.choices else text,
             "texts": {"type": "array", "items": text},
@@ -161,14 +175,22 @@ class Keys(NamedTuple):
 
 
 def _parsed(name: str, given: Any, key: Key) -> Any:
+    if key.kind == "state":
+        return given
     if key.kind == "row":
-        return np.array(parse_row(name, given, key.unit))
+        values = parse_row(name, given, key.unit)
+        if key.share:
+            check_share(name, given, values)
+        return np.array(values)
     if key.kind == "rows":
         if not isinstance(given, list):
             raise ParameterError(f"{name} = {shown(given)} is out of range; allowed: a list of rows")
         return [parse_row(name, row, key.unit) for row in given]
     if key.kind == "quantity":
-        return parse_quantity(name, given, key.unit)
+        value = parse_quantity(name, given, key.unit)
+        if key.share:
+            check_share(name, given, [value])
+        return value
     kind: Any = {"text": str, "texts": list, "count": int, "flag": bool}[key.kind]
     if not isinstance(given, kind) or (key.kind == "count" and isinstance(given, bool)):
         what = {"text": "a text", "texts": "a list of texts", "count": "a whole number", "flag": "true or false"}
@@ -186,9 +208,9 @@ def needed(table: str, values: Mapping[str, Any], *names: str) -> list[Any]:
     Raises
     ------
     ParameterError
-        If one is missing; names table and key.
+        If some are missing; names table and keys.
     """
-    for name in names:
-        if name not in values:
-            raise ParameterError(f"[{table}] lacks {name}")
+    missing = [name for name in names if name not in values]
+    if missing:
+        raise ParameterError(f"[{table}] lacks {' and '.join(missing)}")
     return [values[name] for name in names]

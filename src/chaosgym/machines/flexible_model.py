@@ -6,7 +6,9 @@ from typing import NamedTuple
 import numpy as np
 
 from chaosgym.arrays import Array
+from chaosgym.core.matrices import inv, product
 from chaosgym.core.modal_model import LOAD, STOP, ModalImpactModel, Regimes, Tables
+from chaosgym.errors import ParameterError
 from chaosgym.machines.integrators import ExactEvents
 from chaosgym.machines.modal_blocks import RIGID_SHARE, largest_modulus, modal_blocks, nearly_rigid, settled
 from chaosgym.machines.parameters import refuse_not_finite
@@ -51,8 +53,8 @@ def _regimes(modes: Modes, *systems: tuple[Array, Array]) -> Regimes:
     parts = []
     for matrices in systems:
         generator, from_modal = modal_blocks(*matrices, rigid)
-        output = modes.tip_shape @ from_modal[:n]
-        parts.append((generator, np.linalg.inv(from_modal), from_modal, output, largest_modulus(generator)))
+        output = product(modes.tip_shape, from_modal[:n])
+        parts.append((generator, inv(from_modal), from_modal, output, largest_modulus(generator)))
     return Regimes(*(np.ascontiguousarray(np.stack(part)) for part in zip(*parts, strict=True)))
 
 
@@ -90,7 +92,10 @@ def flexible_model(
     for stop in stops:
         push = np.outer(tip, tip)
         systems.append((np.diag(stiffness) + stop.stiffness * push, modes.damping + stop.damping * push))
-    regimes = _regimes(modes, *systems)
+    try:
+        regimes = _regimes(modes, *systems)
+    except np.linalg.LinAlgError as error:
+        raise ParameterError(f"rounding hides the modes of this machine ({error}); take fewer modes") from error
     static = np.zeros(n) if static_force is None else np.array(static_force, dtype=float)
     with np.errstate(divide="ignore"):
         compliance = float(np.sum(np.divide(tip**2, stiffness, where=tip != 0.0, out=np.zeros(n))))
@@ -98,7 +103,7 @@ def flexible_model(
     for r, stop in enumerate([Stop(0.0, 0.0), *stops]):
         parts = []
         for force in (stop.stiffness * tip, static):
-            load = regimes.to_modal[r] @ np.concatenate([np.zeros(n), force])
+            load = product(regimes.to_modal[r], np.concatenate([np.zeros(n), force]))
             parts.append((*settled(regimes.generator[r], load), load))
         rest.append([part[0] for part in parts])
         # whether a coordinate rests under the static force or drifts is a question of the speed
@@ -131,23 +136,8 @@ def flexible_model(
 
 def with_tables(model: ModalImpactModel, step_phase: float | None = None, rate: float = 0.0) -> ModalImpactModel:
     """Give the model tables of its own, for a drive at ``rate`` [rad/s]; by default of the ``step_phase`` it has."""
-    from chaosgym.core.compilation import call, compile_beside
-    from chaosgym.core.joints.cycle import advance_joints
+    from chaosgym.core.compilation import call
     from chaosgym.core.modal_impact import tabulate
 
-    compile_beside(advance_joints, tabulate, f"from {__name__} import prepare_motion; prepare_motion()")
     phase = model.tables.step_phase if step_phase is None else step_phase
     return model._replace(tables=Tables(phase, *call(tabulate, model, phase, rate)))
-
-
-def prepare_motion() -> None:
-    """Compile or load the kernel that moves every machine of modes, which has one signature."""
-    from chaosgym.core.compilation import prepare
-    from chaosgym.core.cycle import cycle_arrays
-    from chaosgym.core.joints.cycle import advance_joints
-    from chaosgym.core.joints.space import JointRun
-    from chaosgym.core.tangent import no_tangents
-
-    numbers, places = np.empty(0), np.empty(0, np.int64)
-    run, arrays = JointRun(numbers, numbers, places, 1.0, 1.0), cycle_arrays(0, 0)
-    prepare(advance_joints, run, places, numbers, numbers, numbers, arrays, 0, no_tangents(0, 0), numbers, None)

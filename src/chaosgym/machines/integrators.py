@@ -2,7 +2,7 @@
 
 from dataclasses import dataclass, replace
 
-from chaosgym.errors import ParameterError
+from chaosgym.numbers import number, whole
 
 
 @dataclass(frozen=True)
@@ -29,12 +29,9 @@ class ExactEvents:
     event_budget: int = 20_000
 
     def __post_init__(self) -> None:
-        if not 0.0 < self.step_phase <= 1.0:
-            raise ParameterError(f"step_phase = {self.step_phase:g} rad is out of range; allowed: above 0, up to 1")
-        if not 1e-14 <= self.event_tolerance <= 1e-2:
-            raise ParameterError(f"event_tolerance = {self.event_tolerance:g} is out of range; allowed: 1e-14 to 0.01")
-        if self.event_budget < 1:
-            raise ParameterError(f"event_budget = {self.event_budget} is out of range; allowed: 1 or more")
+        number("step_phase", self.step_phase, 1e-6, 1.0, "rad")
+        number("event_tolerance", self.event_tolerance, 1e-14, 1e-2)
+        whole("event_budget", self.event_budget, 1)
 
     def refined(self) -> "ExactEvents":
         """Half the step and a tenth of the tolerance."""
@@ -56,8 +53,7 @@ class RungeKutta4:
     steps_per_cycle: int = 4000
 
     def __post_init__(self) -> None:
-        if not 1 <= self.steps_per_cycle <= 10**9:
-            raise ParameterError(f"steps_per_cycle = {self.steps_per_cycle} is out of range; allowed: 1 to 1e9")
+        whole("steps_per_cycle", self.steps_per_cycle, 1)
 
     def refined(self) -> "RungeKutta4":
         """Half the step."""

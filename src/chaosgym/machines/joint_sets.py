@@ -13,8 +13,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from chaosgym.arrays import Array
+from chaosgym.core import matrices
 from chaosgym.core.compilation import call
 from chaosgym.core.joints.tables import Rubs, read_at_rest
+from chaosgym.core.matrices import product
 from chaosgym.errors import ParameterError
 from chaosgym.machines.modal_blocks import largest_modulus, modal_blocks, settled
 
@@ -162,16 +164,16 @@ class PressedSets:
             springs[j], dampers[j] = self.springs[j, surface], self.dampers[j, surface]
         held, weight, rate = self._friction(digits, springs, pushes)
         shapes = self.sliders.shape
-        stiffness = np.diag(self.stiffness) + (pushes.T * springs) @ self.shape + (shapes.T * held) @ shapes
-        damping = self.damping + (pushes.T * dampers) @ self.shape
+        stiffness = np.diag(self.stiffness) + product(pushes.T * springs, self.shape) + product(shapes.T * held, shapes)
+        damping = self.damping + product(pushes.T * dampers, self.shape)
         rigid = bool(np.any(self.stiffness == 0.0))
         generator, from_modal = modal_blocks(stiffness, damping, rigid, bool(rate.any()))
-        to_modal: Array = np.asarray(np.linalg.inv(from_modal), dtype=np.float64)
+        to_modal: Array = np.asarray(matrices.inv(from_modal), dtype=np.float64)
         rest, drift = np.zeros((m, 2 * n)), np.zeros((m, 2 * n))
         for j in pressed:
-            rest[j], drift[j] = settled(generator, to_modal[:, n:] @ (springs[j] * pushes[j]))
-        constants = (self.shape @ from_modal[:n]) @ rest.T
-        strains = (shapes @ from_modal[:n]) @ rest.T
+            rest[j], drift[j] = settled(generator, product(to_modal[:, n:], springs[j] * pushes[j]))
+        constants = product(self.shape, from_modal[:n], rest.T)
+        strains = product(shapes, from_modal[:n], rest.T)
         if rigid:
             constants[pressed, pressed] -= 1.0
         elif pressed:
@@ -179,14 +181,14 @@ class PressedSets:
             sticks = np.flatnonzero(held).tolist()
             some, pushed = (np.concatenate([a[pressed], shapes[sticks]]) for a in (self.shape, pushes))
             stiff = np.concatenate([springs[pressed], held[sticks]])
-            compliance = (some / self.stiffness) @ pushed.T
-            deep = -np.linalg.inv(np.eye(len(some)) + compliance * stiff)[:, : len(pressed)]
+            compliance = product(some / self.stiffness, pushed.T)
+            deep = -matrices.inv(np.eye(len(some)) + compliance * stiff)[:, : len(pressed)]
             constants[np.ix_(pressed, pressed)] = deep[: len(pressed)]
             strains[np.ix_(sticks, pressed)] = deep[len(pressed) :]
         lag = np.divide(dampers, springs, out=np.zeros(m), where=springs > 0.0)
         follow = np.zeros((2 * n, 2 * len(held)))
         for c in np.flatnonzero(held):
-            follow[:, c] = settled(generator, to_modal[:, n:] @ (held[c] * shapes[c]))[0]
+            follow[:, c] = settled(generator, product(to_modal[:, n:], held[c] * shapes[c]))[0]
             follow[:, len(held) + c] = settled(generator, -follow[:, c])[0]
         rubs = Rubs(self.sliders.joint.astype(float), shapes, follow, weight, rate)
         shown = np.zeros((m + 2 * len(held), m))

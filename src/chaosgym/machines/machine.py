@@ -3,8 +3,8 @@
 import math
 from abc import ABC, abstractmethod
 from collections.abc import Callable, Mapping
-from dataclasses import InitVar, dataclass
-from typing import TYPE_CHECKING, Any, ClassVar, NamedTuple, Self
+from dataclasses import InitVar, dataclass, fields
+from typing import TYPE_CHECKING, Any, ClassVar, NamedTuple, Self, final
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -12,7 +12,8 @@ from numpy.typing import ArrayLike
 from chaosgym.arrays import Array
 from chaosgym.core.cycle import CycleArrays, cycle_arrays
 from chaosgym.errors import ParameterError
-from chaosgym.machines.abilities import Abilities
+from chaosgym.machines.abilities import Abilities, Kinematics
+from chaosgym.machines.accuracy import is_tolerance
 from chaosgym.machines.integrators import ExactEvents, Integrator
 from chaosgym.machines.parameters import check_parameter, expand_fidelity, validate, with_settings
 
@@ -43,6 +44,13 @@ class Choice(NamedTuple):
 
 Option = Number | Choice
 """An option of a machine on the command line: a short name in shop-floor units for some of its fields."""
+
+SPEED_IN_HZ: Mapping[str, Option] = {
+    "--speed-hz": Number("speed", "Hz"),
+    "--speed-rpm": Number("speed", "rpm", 1.0 / 60.0),
+}
+SPEED_IN_RPM: Mapping[str, Option] = {"--speed-rpm": Number("speed", "rpm"), "--speed-hz": Number("speed", "Hz", 60.0)}
+"""Options of a machine whose field ``speed`` is in Hz, or in rpm."""
 
 
 class TaskDefaults(NamedTuple):
@@ -76,8 +84,9 @@ class Machine(Abilities, ABC):
     A subclass declares its fields with ``parameter`` and defines what is abstract here. The rest has a default.
     ``ModalImpactMachine`` defines all but the fields and the model of a machine that is a few modes and one gap.
 
-    The keyword ``fidelity`` sets the fields of a rung of the ladder, as in ``ImpactBeam(fidelity="fine")``. A machine
-    keeps the fields, not the name, so that ``dataclasses.replace`` and ``with_settings`` may change any of them.
+    The keyword ``fidelity`` sets the fields of a rung of the ladder, as in ``ImpactBeam(fidelity="fine")``, or those of
+    the cheapest model within an estimated error, as in ``ImpactBeam(fidelity="1 %")``. A machine keeps the fields, not
+    the name, so that ``dataclasses.replace`` and ``with_settings`` may change any of them.
 
     Raises
     ------
@@ -124,13 +133,29 @@ class Machine(Abilities, ABC):
         for name, value in expand_fidelity(type(self), {"fidelity": fidelity}).items():
             object.__setattr__(self, name, value)
         validate(self)
+        if is_tolerance(fidelity):
+            self._take_model(fidelity)
+
+    def _take_model(self, tolerance: str | None) -> None:
+        """Set the fields of the cheapest model within a tolerance; other fields are checked by a machine like it."""
+        like = type(self)(**{each.name: getattr(self, each.name) for each in fields(self)})
+        chosen = with_settings(like, {"fidelity": tolerance})
+        for each in fields(self):
+            object.__setattr__(self, each.name, getattr(chosen, each.name))
 
     @property
+    @final
     def initial_state(self) -> tuple[float, ...]:
         """State from which it runs where no other is given (n_states,), in SI units; empty for rest."""
         own: tuple[float, ...] = self.__dict__.get("_initial_state", self.stated_state)
         return own
 
+    @final
+    def begins_from(self) -> str:
+        """Where it runs from unless told otherwise, in words: "rest" or "its initial state"."""
+        return "its initial state" if any(self.initial_state) else "rest"
+
+    @final
     def from_state(self, state: ArrayLike) -> Self:
         """Return the machine that runs from a state (n_states,) where no other is given; () for rest.
 
@@ -154,10 +179,11 @@ class Machine(Abilities, ABC):
         return self._with_unchecked(_initial_state=tuple(values.tolist()))
 
     @property
+    @final
     def rung(self) -> str | None:
         """Rung of the ladder whose fields this machine has; None if it stands beside the ladder."""
-        for rung, fields in self.fidelity_ladder.items():
-            if all(getattr(self, name) == value for name, value in fields.items()):
+        for rung, values in self.fidelity_ladder.items():
+            if all(getattr(self, name) == value for name, value in values.items()):
                 return rung
         return None
 
@@ -214,7 +240,7 @@ class Machine(Abilities, ABC):
         Parameters
         ----------
         tangents
-            Deviations that travel along, for a machine that ``carries_deviations``.
+            Deviations that travel along, for a machine whose ``moving`` has them.
 
         Returns
         -------
@@ -228,6 +254,7 @@ class Machine(Abilities, ABC):
         return self.speed_field, self.clearance_field
 
     @property
+    @final
     def cycle_period(self) -> float:
         """Duration of one operating cycle [s]."""
         return float(self.period_at(getattr(self, self.speed_field)))
@@ -238,6 +265,7 @@ class Machine(Abilities, ABC):
         return ()
 
     @property
+    @final
     def surfaces(self) -> Mapping[str, int]:
         """Surfaces that there are, by name, and their columns in ``CycleRecord.peak_force``: one stop, one surface."""
         rooms = [self.room_of(joint) for joint in range(len(self.sides) // 2)]
@@ -269,6 +297,7 @@ class Machine(Abilities, ABC):
         size = np.abs(state)
         return np.asarray(1.0 / np.where(size > 1e-6 * size.max(), size, max(size.max(), 1e-300)))
 
+    @final
     def at(self, speed: float | None = None, clearance: float | None = None) -> Self:
         """Return the machine at another operating point: what else it is was checked when it was made.
 
@@ -301,31 +330,28 @@ class Machine(Abilities, ABC):
         other.__dict__.update(self.__dict__, **fields)
         return other
 
-    def room_of(self, joint: int) -> tuple[float, float]:
-        """That of one of the ``joints``, by its number."""
-        return self.room
+    def room_of(self, joint: int | None = None) -> tuple[float, float]:
+        """Displacement [m] of the monitored joint, or of one of the ``joints`` by its number, at its stops.
 
-    @property
-    def room(self) -> tuple[float, float]:
-        """Displacement [m] of the monitored joint at its lower and its upper stop, infinite where there is none."""
+        The lower one stands first; infinite where there is none.
+        """
         gap = float(getattr(self, self.clearance_field))
         return -gap, gap
 
     @property
-    def stop_rows(self) -> list[tuple[Array, float]]:
-        """Displacement (n,) of each contact per unit coordinate, and the distance [m] to its farthest stop."""
+    def kinematics(self) -> Kinematics | None:
+        """How its joints and points move, and what an impulse does to them; None where it does not tell."""
         equations = self.without_friction
         if equations is None:
-            return []
+            return None
         rooms = [self.room_of(joint) for joint in range(len(equations.joints))]
         farthest = [max((abs(stop) for stop in room if math.isfinite(stop)), default=0.0) for room in rooms]
-        return list(zip(equations.joints, farthest, strict=True))
-
-    @property
-    def unit_knocks(self) -> list[Array]:
-        """Change of the velocities (n,) that changes that of each joint by 1, by an impulse along its motion."""
-        equations = self.without_friction
-        return [] if equations is None else [row / float(row @ row) for row in equations.joints]
+        joints = tuple(f"the joint {name}" for name in self.joints) or ("the joint",)
+        return Kinematics(
+            mobility=np.eye(self.n_velocities),
+            places=dict(zip(joints, equations.joints, strict=True)) | dict(equations.points),
+            stops=list(zip(equations.joints, farthest, strict=True)),
+        )
 
     def sensed(self, peak_force: Array) -> Array:
         """Peak forces [N] that the sensor of the monitored joint shows, (..., cycles), of those of all ``sides``."""

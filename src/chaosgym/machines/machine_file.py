@@ -70,6 +70,19 @@ def machine_class(path: str | Path) -> type[Machine]:
         raise ParameterError(f"{path}: {error}") from None
 
 
+def files_of(path: str | Path) -> list[Path]:
+    """File of a machine, and those that it names.
+
+    Raises
+    ------
+    ParameterError
+        As ``machine_class``.
+    """
+    machine_class(path)
+    _, values = toml_of(path)
+    return [Path(path), *_reader_of(values).files_of(values, Path(path).parent)]
+
+
 def _reduced(machine: Any) -> Any:
     """How a machine is pickled: by the name of its file, whose class has no name of its own."""
     kind = type(machine)

@@ -6,6 +6,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from chaosgym.arrays import Array
+from chaosgym.core import matrices
+from chaosgym.core.matrices import product
 from chaosgym.errors import ParameterError
 
 MAX_CONDITION = 1e6
@@ -39,7 +41,7 @@ def modal_blocks(stiffness: Array, damping: Array, rigid: bool, rubs: bool = Fal
     Where the machine can move as a ``rigid`` body, a direction that neither spring nor damper resists drifts, in a
     block of its own. What slides and ``rubs`` makes the matrices unsymmetric, and may let a motion grow.
     """
-    scale = math.sqrt(np.linalg.norm(stiffness, 2)) or 1.0
+    scale = math.sqrt(matrices.norm(stiffness)) or 1.0
     held, directions = _stretched(stiffness / scale**2 + damping / scale, rubs)
     loose = (held < NEGLIGIBLE * max(1.0, float(held[-1]))) & rigid
     blocks, columns = [], []
@@ -49,7 +51,7 @@ def modal_blocks(stiffness: Array, damping: Array, rigid: bool, rubs: bool = Fal
     # without such directions, the modes stay as they are, to the last digit
     basis = directions[:, ~loose] if loose.any() else np.eye(len(stiffness))
     if basis.shape[1]:
-        own = (basis.T @ stiffness @ basis, basis.T @ damping @ basis)
+        own = (product(basis.T, stiffness, basis), product(basis.T, damping, basis))
         _add_damped(*own, basis, rigid, blocks, columns, rubs)
     first, second = zip(*columns, strict=True)
     from_modal = np.column_stack([*first, *second])
@@ -61,8 +63,8 @@ def modal_blocks(stiffness: Array, damping: Array, rigid: bool, rubs: bool = Fal
 def _stretched(matrix: Array, rubs: bool) -> tuple[Array, Array]:
     """By how much a matrix stretches directions, ascending, and these: singular values and vectors where it rubs."""
     if not rubs:
-        return np.linalg.eigh(matrix)
-    _, sizes, directions = np.linalg.svd(matrix)
+        return matrices.eigh(matrix)
+    _, sizes, directions = matrices.svd(matrix)
     return sizes[::-1], directions[::-1].T
 
 
@@ -75,15 +77,15 @@ def _push_along(stiffness: Array, damping: Array, loose: Array, generator: Array
     for j in range(loose.shape[1], n):
         block, pair = generator[:, j].reshape(2, 2), [j, n + j]
         moved = from_modal[:n, pair]
-        forced = -loose.T @ (stiffness @ moved + damping @ moved @ block)
-        square = block @ block
+        forced = product(-loose.T, product(stiffness, moved) + product(damping, moved, block))
+        square = product(block, block)
         if block[1, 0] != 0.0:
-            along = np.linalg.solve(square.T, forced.T).T
+            along = matrices.solve(square.T, forced.T).T
         else:
             # nothing pushes where the other one rests
             along = np.divide(forced, np.diag(square), out=np.zeros_like(forced), where=np.diag(square) > 0.0)
-        from_modal[:n, pair] += loose @ along
-        from_modal[n:, pair] += loose @ along @ block
+        from_modal[:n, pair] += product(loose, along)
+        from_modal[n:, pair] += product(loose, along, block)
 
 
 def _add_damped(
@@ -103,16 +105,16 @@ def _add_damped(
     eigenvectors that was found serves, unless it would leave no digits.
     """
     n = len(stiffness)
-    scale = math.sqrt(np.linalg.norm(stiffness, 2)) or 1.0
+    scale = math.sqrt(matrices.norm(stiffness)) or 1.0
     # a displacement weighs as much as the velocity that belongs to it, in slow modes as in fast ones
-    rates, directions = _stretched(stiffness + damping @ damping, rubs)
-    weight = directions * np.sqrt(np.maximum(rates, 0.0)) @ directions.T
+    rates, directions = _stretched(stiffness + product(damping, damping), rubs)
+    weight = product(directions * np.sqrt(np.maximum(rates, 0.0)), directions.T)
     found, one, graded = [], np.ones(n), np.arange(1.0, n + 1.0)
     for moved in (0.0 * one, 1e-9 * one, 1e-8 * one, 1e-9 * graded, 1e-8 * graded):
         roots = np.sqrt(1.0 + moved)
         system = np.block([[np.zeros((n, n)), np.eye(n)], [-stiffness, -(np.outer(roots, roots) * damping)]])
-        values, vectors = np.linalg.eig(system)
-        balanced = np.concatenate([weight @ vectors[:n], vectors[n:]])
+        values, vectors = matrices.eig(system)
+        balanced = np.concatenate([product(weight, vectors[:n]), vectors[n:]])
         lengths = np.linalg.norm(balanced, axis=0)
         condition = float(np.linalg.cond(balanced / lengths)) if lengths.all() else math.inf
         found.append((condition, values, vectors))
@@ -127,11 +129,12 @@ def _add_damped(
             "1 by a millionth or more"
         )
     resting = int(np.sum(_stretched(stiffness, rubs)[0] < NEGLIGIBLE * scale**2)) if rigid else 0
-    slowest = np.argsort(np.abs(values))[:resting]
+    order = np.argsort(matrices.modulus(values), kind="stable")
+    slowest = order[:resting]
     values[slowest[values[slowest].imag == 0.0]] = 0.0
-    vectors = np.concatenate([basis @ vectors[:n], basis @ vectors[n:]])
-    turning = [i for i in np.argsort(np.abs(values)) if values[i].imag > 0.0]
-    decaying = [i for i in np.argsort(np.abs(values)) if values[i].imag == 0.0]
+    vectors = np.concatenate([product(basis, vectors[:n]), product(basis, vectors[n:])])
+    turning = [i for i in order if values[i].imag > 0.0]
+    decaying = [i for i in order if values[i].imag == 0.0]
     for i in turning:
         a, b = min(values[i].real, math.inf if rubs else 0.0), values[i].imag
         blocks.append((a, -b, b, a))
@@ -155,17 +158,17 @@ def _add_uncoupled(
     A mode of a ``rigid`` body without a spring creeps to rest, as two real eigenvalues.
     """
     if np.any(stiffness != np.diag(np.diag(stiffness))):
-        rates, shapes = np.linalg.eigh(stiffness)
+        rates, shapes = matrices.eigh(stiffness)
     else:
         rates, shapes = np.diag(stiffness), np.eye(len(stiffness))
-    between = shapes.T @ damping @ shapes
+    between = product(shapes.T, damping, shapes)
     own = np.diag(between)
     held = rates > NEGLIGIBLE * np.max(rates)
     if not (rigid or held.all()) or not np.all(own[held] >= 0.0) or not np.all(own[~held] > NEGLIGIBLE * np.max(own)):
         return False
     if np.any(np.abs(between - np.diag(own)) > UNCOUPLED * np.sqrt(np.outer(own, own))):
         return False
-    for rate, resistance, has_spring, shape in zip(rates, own, held, (basis @ shapes).T, strict=True):
+    for rate, resistance, has_spring, shape in zip(rates, own, held, product(basis, shapes).T, strict=True):
         w = math.sqrt(rate) if has_spring else 0.0
         blocks.append((0.0, w, -w, -resistance))
         first, second = (shape / w, 0.0 * shape) if has_spring else (shape, -shape / resistance)

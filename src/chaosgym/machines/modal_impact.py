@@ -15,8 +15,9 @@ import numpy as np
 
 from chaosgym.arrays import Array
 from chaosgym.core.cycle import CycleArrays
+from chaosgym.core.matrices import product
 from chaosgym.core.modal_model import ModalImpactModel, with_drive_from
-from chaosgym.machines.abilities import Flexible
+from chaosgym.machines.abilities import Flexible, FreeBodies, Propagation
 from chaosgym.machines.flexible_model import with_tables
 from chaosgym.machines.integrators import ExactEvents, Integrator
 from chaosgym.machines.machine import Machine
@@ -88,6 +89,8 @@ class ModalImpactMachine(Machine):
 
     def stops_at(self, clearance: Any) -> Array:
         """Positions of the upper and the lower stop [m] at a clearance, (2,), or at many, (k, 2)."""
+        if isinstance(clearance, float):
+            return np.array([clearance, -clearance])  # many times a second
         return np.stack([clearance, -np.asarray(clearance)], axis=-1)
 
     def reduce(self) -> ModalImpactModel:
@@ -112,9 +115,9 @@ class ModalImpactMachine(Machine):
         return float(np.max(self.structure.regimes.fastest))
 
     @property
-    def carries_deviations(self) -> bool:
-        """Always: deviations cross every contact exactly."""
-        return True
+    def moving(self) -> Propagation:
+        """Exactly, and deviations cross every contact exactly."""
+        return Propagation()
 
     @property
     def flexible(self) -> Flexible:
@@ -123,6 +126,11 @@ class ModalImpactMachine(Machine):
         omega = 2.0 * math.pi * model.excitation_frequency
         drive = model.drive[0] + omega**2 * model.drive[1]
         return Flexible(model.stiffness, model.damping, model.tip_shape[None], drive, model.static_force)
+
+    @property
+    def free_bodies(self) -> FreeBodies | None:
+        """What holds its free bodies; None where springs hold every mode, which is soon seen."""
+        return None if self.structure.stiffness.all() else super().free_bodies
 
     def state_weights(self, state: Array) -> Array:
         """Weights (n_states,) by which the squared norm of a deviation is its energy.
@@ -139,7 +147,7 @@ class ModalImpactMachine(Machine):
         """
         model = self.reduce()
         structure = -float(np.trace(model.damping)) * self.cycle_period
-        return structure - float(model.contact_damping @ contact_time) * float(np.sum(model.tip_shape**2))
+        return structure - float(product(model.contact_damping, contact_time)) * float(np.sum(model.tip_shape**2))
 
     @property
     def mirrors(self) -> bool:

@@ -17,6 +17,8 @@ import numpy as np
 from numpy.polynomial import chebyshev
 
 from chaosgym.arrays import Array
+from chaosgym.core import matrices
+from chaosgym.core.matrices import product
 from chaosgym.core.modal_model import ModalImpactModel, Regimes
 from chaosgym.machines.flexible_model import with_tables
 
@@ -55,7 +57,7 @@ def interpolated(
     """
     known: dict[float, ModalImpactModel] = {}
     for degree in DEGREES:
-        places = np.cos(np.pi * np.arange(degree + 1) / degree)
+        places = matrices.cos(np.pi * np.arange(degree + 1) / degree)
         for place in places:
             if float(place) not in known:
                 known[float(place)] = exact(low + 0.5 * (high - low) * (1.0 + float(place)))
@@ -64,10 +66,11 @@ def interpolated(
             return None
         numbers = [_numbers(_in_phase(model, models[0])) for model in models]
         rows = np.array([np.concatenate(each) for each in numbers])
-        coefficients = np.linalg.solve(chebyshev.chebvander(places, degree), rows)
+        coefficients = matrices.solve(chebyshev.chebvander(places, degree), rows)
         if _converged(coefficients, [len(part) for part in numbers[0]]):
             return lambda value: _model(
-                models[0], chebyshev.chebvander([2.0 * (value - low) / (high - low) - 1.0], degree)[0] @ coefficients
+                models[0],
+                product(chebyshev.chebvander([2.0 * (value - low) / (high - low) - 1.0], degree)[0], coefficients),
             )
     return None
 
@@ -102,13 +105,13 @@ def _in_phase(model: ModalImpactModel, like: ModalImpactModel) -> ModalImpactMod
     turned, back = np.empty_like(regimes.from_modal), np.empty_like(regimes.from_modal)
     for r, (own, other) in enumerate(zip(regimes.from_modal, like.regimes.from_modal, strict=True)):
         turned[r] = _phases(own, other, regimes.generator[r])
-        back[r] = np.linalg.inv(turned[r])
+        back[r] = matrices.inv(turned[r])
     return model._replace(
         rest=np.einsum("rij,rkj->rki", back, model.rest),
         drift=np.einsum("rij,rkj->rki", back, model.drift),
         regimes=regimes._replace(
-            from_modal=regimes.from_modal @ turned,
-            to_modal=back @ regimes.to_modal,
+            from_modal=product(regimes.from_modal, turned),
+            to_modal=product(back, regimes.to_modal),
             output=np.einsum("rj,rji->ri", regimes.output, turned),
         ),
     )

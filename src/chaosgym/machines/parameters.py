@@ -14,7 +14,9 @@ from typing import Any, Literal, TypeVar
 
 import numpy as np
 
-from chaosgym.errors import ParameterError
+from chaosgym.errors import ParameterError, nearest_or
+from chaosgym.machines.accuracy import is_tolerance, model_within, tolerance_of
+from chaosgym.numbers import number, whole
 
 Provenance = Literal["printed", "derived", "calibrated", "assumed", "stated"]
 """printed: in the thesis; derived: follows from printed numbers; calibrated: fitted to printed results; assumed;
@@ -75,10 +77,6 @@ def _parameters_of(machine: type) -> Mapping[str, Parameter]:
     return MappingProxyType({name: about for name, about in described.items() if about is not None})
 
 
-def _is_real(value: Any) -> bool:
-    return not isinstance(value, bool | str) and hasattr(value, "__float__")
-
-
 def check_parameter(owner: Any, name: str, value: Any) -> Any:
     """Return the value in its field's own type.
 
@@ -92,15 +90,9 @@ def check_parameter(owner: Any, name: str, value: Any) -> Any:
         if value not in described.choices:
             raise ParameterError(f"{name} = {value!r} is not one of {', '.join(described.choices)}")
         return value
-    whole = isinstance(getattr(_class_of(owner), name), int)
-    unit = "" if described.unit == "-" else f" {described.unit}"
-    allowed = f"allowed: {described.low:g} to {described.high:g}{unit}"
-    if not _is_real(value) or not math.isfinite(value) or not described.low <= value <= described.high:
-        shown = f"{value:g}{unit}" if _is_real(value) else repr(value)
-        raise ParameterError(f"{name} = {shown} is out of range; {allowed}")
-    if whole and value != int(value):
-        raise ParameterError(f"{name} = {value:g} is not a whole number; {allowed}")
-    return int(value) if whole else float(value)
+    if isinstance(getattr(_class_of(owner), name), int):
+        return whole(name, value, int(described.low), int(described.high))
+    return number(name, value, described.low, described.high, described.unit.strip("-"))
 
 
 def validate(machine: Any) -> None:
@@ -109,10 +101,24 @@ def validate(machine: Any) -> None:
         object.__setattr__(machine, name, check_parameter(machine, name, getattr(machine, name)))
 
 
+USUAL = ("speed", "clearance")
+"""Fields that each machine has, whatever it calls them."""
+
+
 def field_named(owner: Any, name: str) -> str:
-    """Name of a field that may be written as of a joint: ``left.clearance``, or ``joint.clearance`` of the only one."""
+    """Name of a field that may be written as of a joint, or as a machine's "speed" or "clearance"; else as it is.
+
+    A joint's field is written ``left.clearance``, or ``joint.clearance`` of the only one.
+
+    Examples
+    --------
+    >>> from chaosgym.machines.parameters import field_named
+    >>> field_named(chaosgym.ImpactBeam(), "speed")
+    'excitation_frequency'
+    """
     plain = getattr(owner, "aliases", {}).get(name, name.replace(".", "_"))
-    return plain if plain in parameters_of(owner) else name
+    usual = getattr(owner, f"{name}_field", name) if name in USUAL else name
+    return next((field for field in (plain, usual) if field in parameters_of(owner)), name)
 
 
 def by_field(owner: Any, given: Mapping[str, Any]) -> dict[str, Any]:
@@ -146,14 +152,14 @@ def refuse_not_finite(what: str, *arrays: Any) -> None:
 
 def suggestion(name: str, known: Iterable[str]) -> str:
     """End of a message about an unknown name: the nearest known one, or all of them."""
-    from difflib import get_close_matches
-
-    near = get_close_matches(name, list(known), n=1)
-    return f"; did you mean {near[0]}?" if near else f"; known: {', '.join(known)}"
+    names = list(known)
+    return "; " + nearest_or(f"known: {', '.join(names)}", name, names)
 
 
 def with_settings(machine: M, settings: Mapping[str, Any]) -> M:
     """Return the machine with some fields replaced, or with those of a rung of ``fidelity``.
+
+    A ``fidelity`` such as "1 %" takes the cheapest model whose estimated error is within it; see ``model_within``.
 
     Raises
     ------
@@ -162,6 +168,7 @@ def with_settings(machine: M, settings: Mapping[str, Any]) -> M:
         given together with a field that it sets.
     """
     known = parameters_of(machine)
+    tolerance = settings.get("fidelity") if is_tolerance(settings.get("fidelity")) else None
     settings = by_field(machine, expand_fidelity(machine, settings))
     for name in settings:
         if name not in known:
@@ -169,7 +176,7 @@ def with_settings(machine: M, settings: Mapping[str, Any]) -> M:
     made = replace(machine, **settings)  # type: ignore[type-var]
     if "_initial_state" in vars(machine):
         object.__setattr__(made, "_initial_state", vars(machine)["_initial_state"])
-    return made
+    return made if tolerance is None else model_within(made, tolerance).machine
 
 
 def changes_of(machine: Any) -> dict[str, Any]:
@@ -201,6 +208,19 @@ def quantity_of(owner: Any, name: str) -> str:
     return f"{value:,.6g}" + ("" if unit == "-" else f" {unit}")
 
 
+def is_half_play(machine: Any, name: str) -> bool:
+    """Whether a field is half of the play in a joint: a clearance of one with two stops.
+
+    Examples
+    --------
+    >>> from chaosgym.machines.parameters import is_half_play
+    >>> is_half_play(chaosgym.ImpactBeam(), "clearance"), is_half_play(chaosgym.ImpactBeam(), "length")
+    (True, False)
+    """
+    stops = getattr(machine, f"{name.removesuffix('clearance')}stops", "two")
+    return name.endswith("clearance") and stops == "two"
+
+
 def markdown_table(machine: Any) -> list[str]:
     """Lines of a table with every parameter of a machine, its value, unit, provenance and source."""
     rows = ["| parameter | value | unit | provenance | source |", "|---|---|---|---|---|"]
@@ -215,6 +235,8 @@ def markdown_table(machine: Any) -> list[str]:
 def expand_fidelity(machine: Any, settings: Mapping[str, Any]) -> dict[str, Any]:
     """Return the settings with ``fidelity`` replaced by the fields that it sets.
 
+    What a tolerance sets is known only once the machine is made; here it is checked.
+
     Raises
     ------
     ParameterError
@@ -224,9 +246,18 @@ def expand_fidelity(machine: Any, settings: Mapping[str, Any]) -> dict[str, Any]
     rung = settings.get("fidelity")
     if rung is None:
         return others
+    if is_tolerance(rung):
+        tolerance_of(rung)
+        for name in getattr(machine, "model_fields", ()):
+            if name in others:
+                raise ParameterError(
+                    f"fidelity = {rung!r} chooses {name}, and {name} = {others[name]!r} is given too; "
+                    "allowed: one of the two"
+                )
+        return others
     ladder = getattr(machine, "fidelity_ladder", {})
-    if rung not in ladder:
-        raise ParameterError(f"fidelity = {rung!r} is not one of {', '.join(ladder)}")
+    if not isinstance(rung, str) or rung not in ladder:
+        raise ParameterError(f"fidelity = {rung!r} is not one of {', '.join(ladder)}, nor a tolerance such as '1 %'")
     for name, value in ladder[rung].items():
         if name in others:
             raise ParameterError(

@@ -88,6 +88,27 @@ def sample_at(record: Any, moment: float) -> int:
     return (len(record) - 1) * per_cycle + int(moment * per_cycle)
 
 
+def draw(panel: Any, record: Any, colour: str, moment: float, force_limit: float) -> None:
+    """Draw the machine of a run in motion on axes of matplotlib.
+
+    Parameters
+    ----------
+    record
+        ``CycleRecord`` of the run, with its time history.
+    colour
+        Of what tells how the step went: calm, or of Type III.
+    moment
+        Of the last cycle, from 0 to 1.
+    force_limit
+        Force [N] to which pictures scale.
+    """
+    sketch = record.machine.sketch(record, np.array([sample_at(record, moment)]), force_limit)
+    if sketch is None:
+        draw_displacement(panel, record, colour, moment)
+    else:
+        draw_sketch(panel, sketch, colour)
+
+
 def draw_sketch(panel: Any, sketch: Sketch, colour: str) -> None:
     """Draw the first moment of a sketch on axes of matplotlib; ``colour`` tells how the step went."""
     frame(panel, sketch.low, sketch.high)

@@ -7,7 +7,7 @@ from typing import Any, ClassVar, get_type_hints
 from chaosgym.errors import ParameterError
 from chaosgym.machines.machine import Machine
 from chaosgym.machines.parameters import by_field, check_parameter, parameters_of, suggestion
-from chaosgym.units import parse_quantity
+from chaosgym.units import parse_quantity, parse_row
 
 
 def class_with(base: type[Machine], defaults: Mapping[str, Any], attributes: Mapping[str, Any]) -> Any:
@@ -89,4 +89,6 @@ def state_of(operation: Mapping[str, Any], machine: Machine) -> tuple[float, ...
     ParameterError
         If it has another length than the machine's states.
     """
-    return machine.from_state(operation.get("initial_state", ())).initial_state
+    if "initial_state" not in operation:
+        return ()
+    return machine.from_state(parse_row("operation.initial_state", operation["initial_state"], "-")).initial_state

@@ -72,23 +72,33 @@ def branches(diagram: BifurcationDiagram, ax: Axes) -> Axes:
 
 
 def shares(diagram: BifurcationDiagram, ax: Axes) -> Axes:
-    """Shares of the random starts that settle on each branch along a field, and on motions without one, stacked."""
+    """Shares of the random starts that settle on each motion along a field, stacked.
+
+    Motions are runs of stable orbits of the branches, each with the forces that it has, and what lies on no branch.
+    """
     label, factor = axis_label(diagram.machine, diagram.field)
     points = [point for point in diagram.sweep if point.motions]
-    numbers = sorted({one.branch for point in points for one in point.motions if one.branch is not None})
+    places = diagram.places(points)
     parts = np.array(
-        [
-            [sum(one.share for one in point.motions if one.branch == number) for point in points]
-            for number in [*numbers, None]
-        ]
+        [[sum(one.share for one in point.motions if one.place == place) for point in points] for place in places]
     )
-    names = [*(f"branch {number}" for number in numbers), "not periodic or not proven"]
-    there = [row for row in range(len(names)) if parts[row].any()]
-    colours = [SHADES[row % len(SHADES)] if row < len(numbers) else MUTED for row in there]
-    places = [factor * point.value for point in points]
-    ax.stackplot(places, parts[there], labels=[names[row] for row in there], colors=colours, lw=0.0)
+    there = [row for row in range(len(places)) if parts[row].any()]
+    names = [_place_name(diagram, places[row]) for row in there]
+    colours = [MUTED if places[row][0] is None else SHADES[row % len(SHADES)] for row in there]
+    ax.stackplot([factor * point.value for point in points], parts[there], labels=names, colors=colours, lw=0.0)
     ax.set(xlabel=label, ylabel="share of starts", xlim=(factor * diagram.low, factor * diagram.high), ylim=(0.0, 1.0))
     return ax
+
+
+def _place_name(diagram: BifurcationDiagram, place: tuple[int | None, int | None]) -> str:
+    """Name of a motion in the legend: its branch, and its force where several motions lie on it."""
+    number, stretch = place
+    if number is None:
+        return "not periodic or not proven"
+    if stretch is None or len(diagram.branches[number - 1].stretches) == 1:
+        return f"branch {number}"
+    force = max(one.largest_peak for point in diagram.sweep for one in point.motions if one.place == place)
+    return f"branch {number}, {f'up to {force:.3g} N' if force > 0.0 else 'without contact'}"
 
 
 def bifurcation_map(found: BifurcationMap, ax: Axes) -> Axes:

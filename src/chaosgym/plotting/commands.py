@@ -5,7 +5,7 @@ Figures are as wide as a column of a journal takes at 80 % (4.4 in), so that the
 
 from collections.abc import Callable, Sequence
 from functools import partial, wraps
-from pathlib import Path
+from textwrap import wrap
 from typing import Any
 
 import matplotlib
@@ -24,10 +24,12 @@ from chaosgym.machines import Machine
 from chaosgym.plotting import response
 from chaosgym.plotting.branches import bifurcation_map, branches, shares
 from chaosgym.plotting.design import cost_against_life, peak_record, series_life, type_map_around
-from chaosgym.plotting.labels import axis_label
-from chaosgym.plotting.style import ACCENT, INK, NATURE_COLOURS, STYLE, figure_of
+from chaosgym.plotting.labels import axis_label, called
+from chaosgym.plotting.sketch import draw_machine
+from chaosgym.plotting.style import ACCENT, INK, MUTED, NATURE_COLOURS, STYLE, figure_of
 from chaosgym.recordings.measured_sweep import SweepTypes
 from chaosgym.recordings.run_up import RunUp
+from chaosgym.recordings.runs import Run
 from chaosgym.series import Diagnosis
 from chaosgym.simulation import CycleRecord, simulate
 
@@ -48,6 +50,16 @@ TITLE: dict[str, Any] = {"x": 0.02, "ha": "left", "fontsize": 10.5, "fontweight"
 """Style of the title of a picture."""
 
 
+LETTERS = 11.7
+"""Letters of a title in an inch."""
+
+
+def _titled(figure: Figure, text: str) -> None:
+    """Write a title; lines that are longer than the figure is wide are broken."""
+    width = int(LETTERS * figure.get_figwidth())
+    figure.suptitle("\n".join(part for line in text.split("\n") for part in wrap(line, width)), **TITLE)
+
+
 def _styled(draw: Callable[..., Figure]) -> Callable[..., Figure]:
     @wraps(draw)
     def drawn(*arguments: Any, **keywords: Any) -> Figure:
@@ -59,7 +71,7 @@ def _styled(draw: Callable[..., Figure]) -> Callable[..., Figure]:
 
 def point_of(machine: Machine, joint: str | None = None) -> str:
     """Name and operating point of a machine, for a title, and the joint that is shown where there are several."""
-    lower, upper = machine.room
+    lower, upper = machine.room_of()
     shown, gap = [], "±" if lower == -upper else "gap "
     for name in (machine.speed_field, machine.clearance_field):
         label, factor = axis_label(machine, name)
@@ -68,7 +80,7 @@ def point_of(machine: Machine, joint: str | None = None) -> str:
             sign = f"{name.removesuffix('_clearance')} {gap}"
         shown.append(f"{sign}{factor * getattr(machine, name):.4g} {label.rpartition('[')[2].rstrip(']')}")
     shown += [] if joint is None else [f"shown: {joint}"]
-    return f"{Path(machine.name).stem}, {', '.join(shown)}"
+    return f"{called(machine)}, {', '.join(shown)}"
 
 
 def _followed(record: CycleRecord, cycles: int) -> CycleRecord:
@@ -80,15 +92,19 @@ def _followed(record: CycleRecord, cycles: int) -> CycleRecord:
 
 
 POSES = 8
-"""Moments of a cycle at which a machine is drawn."""
+"""Moments of a cycle at which a mechanism is drawn."""
 
 
 @_styled
 def machine_figure(machine: Machine) -> Figure:
-    """Draw a mechanism at eight crank angles, with the paths of its points and its gaps larger than they are."""
+    """Draw a machine with its gaps larger than they are; a mechanism at eight crank angles, with its points' paths."""
     figure = figure_of(1.6 * WIDTH, 4.2)
-    machine.draw_poses(figure.subplots(2, POSES // 2).ravel())
-    figure.suptitle(f"{point_of(machine)}\nCrank angles; rings: joints with clearance", **TITLE)
+    if machine.draw_poses(figure.subplots(2, POSES // 2).ravel()):
+        _titled(figure, f"{point_of(machine)}\nCrank angles; rings: joints with clearance")
+        return figure
+    figure.clear()
+    draw_machine(machine, figure.subplots())
+    _titled(figure, point_of(machine))
     return figure
 
 
@@ -117,7 +133,7 @@ def simulation_figure(record: CycleRecord, transient: int = 0) -> Figure:
     shown = f"the last {len(last)} cycles" if len(last) > 1 else "the last cycle"
     upward = machine.sides[0] if last.joint_name is None else "upper"
     force.set(xlabel=f"time over {shown} [{unit}]", ylabel=f"force, {upward} + [N]")
-    figure.suptitle(point_of(machine, last.joint_name), **TITLE)
+    _titled(figure, point_of(machine, last.joint_name))
     figure.align_ylabels()
     return figure
 
@@ -141,28 +157,28 @@ def diagnosis_figure(verdict: MachineDiagnosis) -> Figure:
     worst = judged.worst_side
     response.cycle_points(judged.peak_force[:, worst], peaks, first=first, color=colour)
     peaks.set_ylabel(f"peak force, {machine.sides[worst]} [N]")
-    figure.suptitle(f"{point_of(machine, judged.joint_name)}\n{verdict.statement.headline}", **TITLE)
+    _titled(figure, f"{point_of(machine, judged.joint_name)}\n{verdict.statement.headline}")
     return figure
 
 
 @_styled
-def measured_figure(peaks: Array, verdict: Diagnosis, title: str, unit: str = "N") -> Figure:
-    """Measured peaks over the cycles, and their return map."""
-    colour = NATURE_COLOURS[verdict.nature]
+def measured_figure(run: Run) -> Figure:
+    """Readings of a recording over the cycles, and their return map."""
+    colour = NATURE_COLOURS[run.verdict.diagnosis.nature]
     figure = figure_of(WIDTH, 5.6)
     over, mapped = figure.subplots(2, 1, height_ratios=(2, 3))
-    response.cycle_points(peaks, over, color=colour)
-    response.next_peak(peaks, mapped, color=colour)
-    if unit != "N":
-        over.set_ylabel(f"reading [{unit}]")
-        mapped.set_xlabel(f"reading of a cycle [{unit}]")
-        mapped.set_ylabel(f"of the next [{unit}]")
-    figure.suptitle(f"{title}\n{verdict.statement.headline}", **TITLE)
+    response.cycle_points(run.peaks, over, color=colour)
+    response.next_peak(run.peaks, mapped, color=colour)
+    if run.unit != "N":
+        over.set_ylabel(f"reading [{run.unit}]")
+        mapped.set_xlabel(f"reading of a cycle [{run.unit}]")
+        mapped.set_ylabel(f"of the next [{run.unit}]")
+    _titled(figure, f"{run.title}\n{run.verdict.diagnosis.statement.headline}")
     return figure
 
 
-MOST_THUMBNAILS, ACROSS = 60, 5
-"""Recordings on one page at the most, and beside each other."""
+MOST_THUMBNAILS, ACROSS, TITLE_WIDTH = 60, 5, 32
+"""Recordings on one page at the most, and beside each other; letters of a line above one."""
 
 
 @_styled
@@ -171,23 +187,24 @@ def thumbnails(shown: list[tuple[str, Array, Diagnosis]]) -> Figure:
     told = shown[:MOST_THUMBNAILS]
     across = min(ACROSS, len(told))
     rows = -(-len(told) // across)
-    figure = figure_of(2.6 * across, 1.7 * rows + 0.5)
+    figure = figure_of(2.6 * max(across, 2), 1.8 * rows + 0.5)
     for ax, (title, peaks, verdict) in zip(figure.subplots(rows, across, squeeze=False).flat, told, strict=False):
         number = np.arange(1, len(peaks) + 1)
         ax.plot(number, peaks, ".", ms=2, mew=0.0, color=NATURE_COLOURS[verdict.nature], rasterized=len(peaks) > 5000)
-        ax.set_title(f"{_shortened(title)}\n{verdict.words}", fontsize=7)
+        words = wrap(verdict.words, TITLE_WIDTH, max_lines=2, placeholder=" ...")
+        ax.set_title("\n".join([_shortened(title), *words]), fontsize=7)
         ax.tick_params(labelsize=6)
         ax.margins(x=0.01)
     for ax in figure.axes[len(told) :]:
         ax.remove()
     left_out = f", the first {len(told)} of {len(shown)}" if len(told) < len(shown) else ""
-    figure.suptitle(f"Readings over the cycles{left_out}", **TITLE)
+    _titled(figure, f"Readings over the cycles{left_out}")
     return figure
 
 
 def _shortened(title: str) -> str:
     """The end of a title that is too long."""
-    return title if len(title) <= 34 else f"...{title[-31:]}"
+    return title if len(title) <= TITLE_WIDTH else f"...{title[3 - TITLE_WIDTH :]}"
 
 
 @_styled
@@ -196,7 +213,7 @@ def sweep_figure(speeds: Array, peaks: Array, types: SweepTypes, label: str, tit
     figure = figure_of(1.45 * WIDTH, 3.0)
     ax = response.types_over_speed(speeds, peaks, types, figure.subplots())
     ax.set(xlabel=label, ylabel="peak force [N]")
-    figure.suptitle(title, **TITLE)
+    _titled(figure, title)
     return figure
 
 
@@ -220,13 +237,18 @@ def run_up_figure(found: RunUp, title: str, unit: str) -> Figure:
         campbell.text(
             1.01 * rpm.max(), line.order * spectra.speeds.max(), f"{round(line.order, 2):g}", fontsize=7, va="center"
         )
-    campbell.set(ylabel="frequency [Hz]", title="Size: amplitude of an order")
+    top = campbell.get_ylim()[1] if found.lines else 1.1 * max((one.frequency for one in found.fixed), default=1.0)
+    for fixed in found.fixed:
+        if fixed.frequency < top:
+            campbell.axhline(fixed.frequency, color=MUTED, lw=0.9, ls="--")
+            campbell.text(rpm.min(), fixed.frequency, f"{fixed.frequency:.3g} Hz", fontsize=7, va="bottom")
+    campbell.set(ylabel="frequency [Hz]", title="Size: amplitude of an order", ylim=(0.0, top))
     if found.types is None:
         peaks.plot(found.speeds, found.cycles.peaks, ".", ms=3.0, mew=0.0, color=INK)
     else:
         response.types_over_speed(found.judged[0], found.judged[1], found.types, peaks)
     peaks.set(xlabel="speed [rpm]", ylabel=f"peak of a turn [{unit}]")
-    figure.suptitle(title, **TITLE)
+    _titled(figure, title)
     return figure
 
 
@@ -260,7 +282,7 @@ def peaks_figure(measured: MeasuredPeaks) -> Figure:
     )
     rated = measured.criteria.load_rating is not None
     title = f"Life {life} million cycles ({low} to {high})" if rated else f"Equivalent force {found.force:.1f} N"
-    figure.suptitle(title, **TITLE)
+    _titled(figure, title)
     left.set_title("")
     return figure
 
@@ -277,9 +299,8 @@ def study_figure(study: DesignStudy) -> Figure:
     figure = figure_of(1.05 * WIDTH * len(panels), 3.6)
     for ax, panel in zip(np.ravel(figure.subplots(1, len(panels))), panels, strict=True):
         panel(ax)
-    name = Path(found.machine.name).stem
-    title = f"{name}: Type {found.type}, {found.verdict}"
-    figure.suptitle(title, **TITLE)
+    title = f"{called(found.machine)}: Type {found.type}, {found.verdict}"
+    _titled(figure, title)
     return figure
 
 
@@ -293,8 +314,7 @@ def branch_figure(diagram: BifurcationDiagram) -> Figure:
     if shared:
         shares(diagram, panels[1]).legend(loc="upper left", bbox_to_anchor=(1.0, 1.0), fontsize=7)
     figure.legend(*ax.get_legend_handles_labels(), loc="outside lower center", ncols=5, fontsize=8)
-    name = Path(diagram.machine.name).stem
-    figure.suptitle(f"{name}: periodic orbits", **TITLE)
+    _titled(figure, f"{called(diagram.machine)}: periodic orbits")
     return figure
 
 
@@ -304,8 +324,7 @@ def bifurcation_map_figure(found: BifurcationMap) -> Figure:
     figure = figure_of(1.6 * WIDTH, 4.4)
     ax = bifurcation_map(found, figure.subplots())
     figure.legend(*ax.get_legend_handles_labels(), loc="outside lower center", ncols=4, fontsize=8)
-    name = Path(found.machine.name).stem
-    figure.suptitle(f"{name}: where motions change", **TITLE)
+    _titled(figure, f"{called(found.machine)}: where motions change")
     return figure
 
 
@@ -332,5 +351,5 @@ def overlay_figure(result: Overlay) -> Figure:
     spread.set(xlabel="peak force [N]", ylabel="share of the cycles below")
     spread.set_title(f"{result.distance:.3g} N apart on average", fontsize=9)
     section.set(xlabel="peak force of a cycle [N]", ylabel="of the next [N]")
-    figure.suptitle(result.machine.name, fontsize=10)
+    figure.suptitle(called(result.machine), fontsize=10)
     return figure

@@ -10,10 +10,10 @@ from chaosgym.design.design_study import DesignStudy
 from chaosgym.design.fatigue import equivalent_force
 from chaosgym.design.measured import MeasuredPeaks
 from chaosgym.design.methodology import Assessment
-from chaosgym.design.told import NOT_ASKED, hours_told, listed, percent_told, share_told
+from chaosgym.design.texts import NOT_ASKED, hours_text, listed, percent_text, share_text
 from chaosgym.machines.parameters import parameters_of, quantity_of
 from chaosgym.plotting import design as figures
-from chaosgym.plotting.design_report import HEADLINES, drawn_by, picture_of, rendered, tolerance_told
+from chaosgym.plotting.design_report import HEADLINES, drawn_by, picture_of, rendered, tolerance_text
 
 
 def comparison_report(
@@ -89,12 +89,16 @@ def _column(study: DesignStudy) -> dict[str, str]:
     meeting = study.combination.meeting
     forces = _forces(found)
     rated, asked = found.criteria.load_rating is not None, found.criteria
-    required = hours_told(hours_of(asked.life, period)) if asked.life is not None else NOT_ASKED
-    lasts = hours_told(hours_of(value.life_interval.low, period)) if rated else NOT_ASKED
+    required = hours_text(hours_of(asked.life, period)) if asked.life is not None else NOT_ASKED
+    lasts = hours_text(hours_of(value.life_interval.low, period)) if rated else NOT_ASKED
     probable = NOT_ASKED
     if meeting is not None:
-        probable = f"{percent_told(meeting.share)} ({percent_told(meeting.low)} to {percent_told(meeting.high)})"
-    suffices = "none needed" if study.improvement is None else best.told if best else "none"
+        probable = f"{percent_text(meeting.share)} ({percent_text(meeting.low)} to {percent_text(meeting.high)})"
+    suffices = "not looked for" if study.verdict_only else "none"
+    if study.improvement is None and found.verdict == "meets":
+        suffices = "none needed"
+    elif best is not None:
+        suffices = best.told
     return {
         "verdict": HEADLINES[found.verdict][1],
         "machine": machine.name,
@@ -105,7 +109,7 @@ def _column(study: DesignStudy) -> dict[str, str]:
         "machines in the tolerances": found.series.told.partition(" of ")[0],
         "life in operation": lasts,
         "life required": required,
-        "reliability": share_told(value.reliability_interval.low),
+        "reliability": share_text(value.reliability_interval.low),
         "mean peak force, nominal": f"{np.mean(found.nominal.worse_side(exponent)):.1f} N",
         "largest peak force": f"{value.largest_force:.1f} N",
         "equivalent force": f"{value.force:.1f} N",
@@ -123,14 +127,14 @@ def _measured_column(measured: MeasuredPeaks, study: DesignStudy) -> dict[str, s
     told = {
         "machine": measured.source.get("file", MEASURED),
         "nominal response": measured.verdict.diagnosis.nature,
-        "life in operation": hours_told(hours_of(value.life_interval.low, period)),
+        "life in operation": hours_text(hours_of(value.life_interval.low, period)),
         "life required": NOT_ASKED
         if found.criteria.life is None
-        else hours_told(hours_of(found.criteria.life, period)),
+        else hours_text(hours_of(found.criteria.life, period)),
         "mean peak force, nominal": f"{np.mean(measured.peaks):.1f} N",
         "largest peak force": f"{value.largest_force:.1f} N",
         "equivalent force": f"{value.force:.1f} N",
-        "reliability": share_told(value.reliability_interval.low),
+        "reliability": share_text(value.reliability_interval.low),
     }
     if found.criteria.life is not None:
         told["load rating needed"] = f"{value.required_load_rating:.0f} N"
@@ -143,7 +147,7 @@ def _differing(studies: Mapping[str, DesignStudy]) -> dict[str, list[str]]:
     for study in studies.values():
         found = study.assessment
         column = {
-            name: f"{quantity_of(found.machine, name)} {tolerance_told(found, name)}".strip()
+            name: f"{quantity_of(found.machine, name)} {tolerance_text(found, name)}".strip()
             for name in parameters_of(found.machine)
         }
         columns.append(

@@ -14,12 +14,12 @@ from chaosgym.arrays import Array
 from chaosgym.design.bearing import STRENGTH
 from chaosgym.design.combination import Combination
 from chaosgym.design.fatigue import equivalent_force, rating_life
-from chaosgym.design.improve import Improvement
 from chaosgym.design.methodology import Assessment
 from chaosgym.design.peak_impacts import PeakImpactDiagram
 from chaosgym.design.reliability import hertz_pressure
 from chaosgym.design.statistics import histogram, running_statistics
 from chaosgym.design.trends import LifeTrend
+from chaosgym.design.trials import Improvement
 from chaosgym.diagnosis import ResponseMap
 from chaosgym.machines import Machine
 from chaosgym.machines.drive_torque import DriveTorque

@@ -18,16 +18,20 @@ from matplotlib.figure import Figure
 
 from chaosgym.arrays import Array
 from chaosgym.design.bearing import hours_of
+from chaosgym.design.changes import value_text
 from chaosgym.design.design_study import DesignStudy
 from chaosgym.design.fatigue import rating_life
-from chaosgym.design.measured import MeasuredPeaks
 from chaosgym.design.methodology import Assessment
-from chaosgym.design.told import CRITERIA, hours_told, life_told, listed, number_told, percent_told, share_told
+from chaosgym.design.texts import CRITERIA, hours_text, life_text, listed, number_text, percent_text, share_text
 from chaosgym.errors import DesignError
-from chaosgym.files import write_atomically
+from chaosgym.files import check_place, write_atomically
 from chaosgym.machines.parameters import Parameter, parameters_of, quantity_of
 from chaosgym.plotting import design as figures
+from chaosgym.plotting.labels import called
+from chaosgym.plotting.printed import print_page, printing_browser
+from chaosgym.plotting.sketch import draw_machine
 from chaosgym.plotting.style import STYLE, TYPE_COLOURS, figure_of
+from chaosgym.series.verdict import COEXISTING, TYPE_MEANINGS
 from chaosgym.version import __version__
 
 CONVERGENCE = (
@@ -35,22 +39,15 @@ CONVERGENCE = (
     "dashed line on."
 )
 
+PDF = ".pdf"
+"""Ending of a report that is printed."""
+
 HEADLINES = {
     "meets": ("good", "Meets its criteria"),
     "fails": ("bad", "Does not meet its criteria"),
     "undetermined": ("open", "Not decided"),
     "not judged": ("open", "Not judged"),
 }
-
-WHAT_TYPES_MEAN = {
-    "I": "repeats, and follows a trend when parameters vary",
-    "II": "repeats, but small variations change the force by more than 10 %",
-    "III": "unpredictable in detail, so that only statistics hold",
-    "undetermined": "the nature of the nominal response could not be told",
-}
-
-COEXISTING = "repeats, but how it was started decides which of several motions it is"
-"""What Type III means where motions of different force coexist."""
 
 
 class Picture(NamedTuple):
@@ -92,7 +89,7 @@ def design_report(study: DesignStudy, command: str = "", *, date: str = "", brie
         study=study,
         tone=tone,
         headline=headline,
-        meaning=COEXISTING if found.response.coexists else WHAT_TYPES_MEAN[found.type],
+        meaning=COEXISTING if found.response.coexists else TYPE_MEANINGS[found.type],
         missed=[check.name for check in found.checks if not check.met],
         met={check.name: check.met for check in found.checks},
         intervals={
@@ -125,16 +122,6 @@ def _of_section(study: DesignStudy) -> dict[str, Parameter]:
     return {name: about for name, about in parameters_of(found.bending).items() if name not in own}
 
 
-def measured_report(measured: MeasuredPeaks, command: str = "") -> str:
-    """HTML report on measured peak forces."""
-    record = _figure_of_peaks(measured.peaks, measured.criteria.life_exponent)
-    pictures = [
-        picture_of(record, "Peak force of every cycle, and how often each force occurs.", wide=True),
-        picture_of(_figure_of_convergence(measured.peaks, measured.convergence.cycles), CONVERGENCE),
-    ]
-    return rendered("measured.html", command, measured=measured, pictures=pictures)
-
-
 def rendered(template: str, command: str, **names: object) -> str:
     """HTML page of a template; ``command`` is printed as the way to make it again."""
     environment = jinja2.Environment(
@@ -145,18 +132,20 @@ def rendered(template: str, command: str, **names: object) -> str:
     )
     environment.filters["listed"] = listed
     environment.filters["words"] = environment.filters["named"] = lambda name: NAMES.get(name, name.replace("_", " "))
+    environment.filters["called"] = called
     known = {
         "version": __version__,
         "command": command,
         "type_colours": TYPE_COLOURS,
         "value_of": quantity_of,
-        "tolerance_of": tolerance_told,
+        "changed_to": value_text,
+        "tolerance_of": tolerance_text,
         "newton": lambda value: f"{value:.2f} N",
-        "life": life_told,
-        "hours": hours_told,
-        "share": share_told,
-        "number": number_told,
-        "percent": percent_told,
+        "life": life_text,
+        "hours": hours_text,
+        "share": share_text,
+        "number": number_text,
+        "percent": percent_text,
         "shown": CRITERIA,
     }
     return environment.get_template(template).render(**known, **names) + "\n"
@@ -165,7 +154,7 @@ def rendered(template: str, command: str, **names: object) -> str:
 def write_report(
     page: str, numbers: Mapping[str, object], out: str | Path, overwrite: bool = False
 ) -> tuple[Path, Path]:
-    """Write the HTML file, and the numbers as JSON beside it.
+    """Write the page as HTML, or as PDF where the name ends so, and the numbers as JSON beside it.
 
     Returns
     -------
@@ -174,32 +163,37 @@ def write_report(
     Raises
     ------
     DesignError
-        If one of them exists and ``overwrite`` is not set.
+        If one of them exists and ``overwrite`` is not set, or a PDF is asked for and no browser prints it.
     OSError
         If one can't be written.
     """
     paths = report_paths(out, overwrite)
     text = json.dumps(numbers, allow_nan=False, indent=1)
     for path, content in zip(paths, (page, text + "\n"), strict=True):
-        write_atomically(path, partial(_write, content=content))
+        write = print_page if path.suffix.lower() == PDF else _write
+        write_atomically(path, partial(write, content))
     return paths
 
 
-def _write(path: Path, content: str) -> None:
+def _write(content: str, path: Path) -> None:
     path.write_text(content, encoding="utf-8")
 
 
 def report_paths(out: str | Path, overwrite: bool = False) -> tuple[Path, Path]:
-    """Paths of the HTML and the JSON file, both free to be written."""
+    """Paths of the HTML or PDF file and the JSON file, both free to be written."""
     page = Path(out)
-    if page.suffix.lower() not in (".html", ".htm"):
-        raise DesignError(f"out = {str(out)!r} is not an HTML file; allowed: a name that ends in .html")
+    if page.suffix.lower() not in (".html", ".htm", PDF):
+        raise DesignError(f"out = {str(out)!r} is no report; allowed: a name that ends in .html or .pdf")
+    if page.suffix.lower() == PDF:
+        printing_browser()
     paths = page, page.with_suffix(".json")
     for path in paths:
         if path.exists() and not overwrite:
             raise DesignError(f"{path} exists; choose another name, or say --overwrite")
     if not page.parent.is_dir():
         raise DesignError(f"{page.parent} is no folder")
+    for path in paths:
+        check_place(path)
     return paths
 
 
@@ -215,6 +209,8 @@ def _pictures(study: DesignStudy) -> list[Picture]:
             wide=True,
         )
     ]
+    caption = "The machine in one cycle, its gaps larger than they are."
+    pictures.append(picture_of(drawn_by(lambda ax: draw_machine(machine, ax)), caption))
     if study.improvement is not None and study.improvement.suggestions:
         improvement = study.improvement
         solid = "Filled: meets all criteria. " if found.checks else ""
@@ -227,6 +223,7 @@ def _pictures(study: DesignStudy) -> list[Picture]:
     if study.map is not None:
         caption = "Each square is a machine with its own tolerances around it. Box: the tolerances; circle: the design."
         region, result = study.assessment.region, study.map
+        caption = " ".join([caption, *(f"{line[0].upper()}{line[1:]}." for line in result.calm.lines)])
         pictures.append(picture_of(drawn_by(lambda ax: figures.type_map_around(result, region, ax)), caption))
     if study.life_over_speed is not None:
         trend = study.life_over_speed
@@ -235,7 +232,8 @@ def _pictures(study: DesignStudy) -> list[Picture]:
             "the smallest peak alone would suggest. Dotted: the design."
         )
         pictures.append(picture_of(drawn_by(lambda ax: figures.life_over_speed(trend, machine, ax)), caption))
-    caption = "Machines with deviations spread over all tolerances at once, each from rest, by its own statistics."
+    begun = machine.begins_from()
+    caption = f"Machines with deviations spread over all tolerances at once, each from {begun}, by its own statistics."
     pictures.append(picture_of(drawn_by(lambda ax: figures.series_life(found, ax)), caption))
     if found.criteria.tells_reliability:
         caption = "Contact stress at the peak of every cycle, beside the scatter of the strength."
@@ -250,7 +248,7 @@ def _pictures(study: DesignStudy) -> list[Picture]:
         caption = (
             "Share of the variance in which each parameter takes part, alone or with others (total index). Of "
             f"{study.combination.sampled} machines in the tolerances; lines: {100 * found.criteria.confidence:g} % "
-            "intervals."
+            "intervals. Above 1 is the error of the sample."
         )
         pictures.append(picture_of(drawn_by(lambda ax: figures.total_indices(study.combination, ax)), caption))
         caption = "Machines built to the tolerances, over the parameter that matters most for the largest peak force."
@@ -301,7 +299,7 @@ def picture_of(figure: Figure, caption: str, wide: bool = False) -> Picture:
     return Picture(base64.b64encode(buffer.getvalue()).decode("ascii"), caption, wide)
 
 
-def tolerance_told(found: Assessment, name: str) -> str:
+def tolerance_text(found: Assessment, name: str) -> str:
     """Tolerance of a parameter, for people; empty without one."""
     if name not in found.region:
         return ""

@@ -16,7 +16,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from chaosgym.arrays import Array
 from chaosgym.errors import DatasetError
-from chaosgym.plotting.labels import axis_label
+from chaosgym.plotting.labels import axis_label, called
 from chaosgym.plotting.style import ACCENT, INK, MUTED, NATURE_COLOURS, PALE, STYLE, TYPE_COLOURS, figure_of
 from chaosgym.recordings.measured_sweep import SweepTypes
 from chaosgym.sweeps import LabelledSweep, SweepPlan
@@ -162,12 +162,12 @@ def force_diagram(sweep: LabelledSweep, ax: Axes) -> Axes:
     known = np.array([nature is not None for nature in sweep.column("nature")])
     at, low, high = (sweep.column(name)[known] for name in (field, "peak_force_min", "peak_force_max"))
     force_spans(factor * at, low, high, sweep.column("nature")[known], ax)
-    ax.set(xlabel=label, title=f"{machine.name}: forces of {len(at)} points")
+    ax.set(xlabel=label, title=f"{called(machine)}: forces of {len(at)} points")
     return ax
 
 
 def nature_map(sweep: LabelledSweep, ax: Axes) -> Axes:
-    """Open circles: periodic; black dots: chaotic; crosses: undetermined. Shading: response type."""
+    """Open circles: periodic; diamonds: quasiperiodic; dots: chaotic; crosses: undetermined. Shading: response type."""
     plan = sweep.plan
     if len(plan.fields) != 2:
         raise DatasetError(f"a map needs a grid over two fields; this one varies {', '.join(plan.fields)}")
@@ -183,6 +183,7 @@ def nature_map(sweep: LabelledSweep, ax: Axes) -> Axes:
     nature = sweep.column("nature")
     marks: dict[str, dict[str, Any]] = {
         "periodic": {"facecolors": "none", "edgecolors": "black", "linewidths": 0.6},
+        "quasiperiodic": {"marker": "D", "color": NATURE_COLOURS["quasiperiodic"]},
         "chaotic": {"color": "black"},
         "undetermined": {"marker": "x", "color": "black"},
     }
@@ -191,11 +192,21 @@ def nature_map(sweep: LabelledSweep, ax: Axes) -> Axes:
         if rows.any():
             ax.scatter(speed[rows], clearance[rows], s=9, label=name, **style)
     shown = [
-        Patch(color=colour, alpha=0.45, label=f"Type {kind}") for kind, colour in TYPE_COLOURS.items() if kind in kinds
+        Patch(color=colour, alpha=0.45, label=f"Type {kind}" if kind != "undetermined" else _untyped(sweep))
+        for kind, colour in TYPE_COLOURS.items()
+        if kind in kinds
     ]
     handles = [*ax.get_legend_handles_labels()[0], *shown]
-    ax.figure.legend(handles=handles, loc="outside lower center", fontsize=8, ncols=6)
-    return _label(plan, ax, f"{plan.machine.name}: natures and response types")
+    ax.figure.legend(
+        handles=handles, loc="outside lower center", fontsize=8, ncols=len(handles) if len(handles) < 6 else 4
+    )
+    return _label(plan, ax, f"{called(plan.machine)}: natures and response types")
+
+
+def _untyped(sweep: LabelledSweep) -> str:
+    """What the points without a type are."""
+    natures = set(sweep.column("nature")[sweep.column("response_type") == "undetermined"])
+    return "periodic, tolerance not checked" if natures == {"periodic"} else "type undetermined"
 
 
 def share_map(sweep: LabelledSweep, column: str, label: str, ax: Axes) -> Axes:
@@ -215,7 +226,7 @@ def share_map(sweep: LabelledSweep, column: str, label: str, ax: Axes) -> Axes:
     ax.figure.colorbar(mesh, ax=ax, label=f"share {label}")
     if logarithmic:
         ax.set_yscale("log")
-    return _label(plan, ax, f"{plan.machine.name}: {column.replace('_', ' ')} {label}")
+    return _label(plan, ax, f"{called(plan.machine)}: {column.replace('_', ' ')} {label}")
 
 
 def _plane(plan: SweepPlan) -> tuple[str, str]:

@@ -5,7 +5,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from chaosgym.errors import ChaosgymError
-from chaosgym.files import write_atomically
+from chaosgym.files import check_place, write_atomically
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -61,7 +61,7 @@ def check_picture(path: Path, formats: tuple[str, ...] = FORMATS) -> Path:
     Raises
     ------
     ChaosgymError
-        If its name ends in another format, or its folder is missing.
+        If its name ends in another format, or its folder is missing or takes no file.
     """
     if path.suffix.lower() not in formats:
         raise ChaosgymError(
@@ -70,6 +70,7 @@ def check_picture(path: Path, formats: tuple[str, ...] = FORMATS) -> Path:
         )
     if not path.absolute().parent.is_dir():
         raise ChaosgymError(f"{path.absolute().parent} is no folder; choose another file")
+    check_place(path)
     return path
 
 

@@ -2,18 +2,19 @@
 
 import math
 import re
+from collections.abc import Iterator
 from fnmatch import fnmatchcase
 from typing import NamedTuple
 
 import numpy as np
 
 from chaosgym.arrays import Array
-from chaosgym.errors import DiagnosisError
+from chaosgym.errors import DiagnosisError, nearest_or
 from chaosgym.recordings.quantities import CLOCK, FORCES, OTHERS, SPEEDS, VOLTS, as_unit, split_unit
 from chaosgym.recordings.read import Recording
 
 OTHER = re.compile(
-    r"(cycle|zyklus|takt|index|nr|no|count(er)?|rpm|speed|drehzahl|hz|freq\w*|"
+    r"(cycle|zyklus|takt|index|nr|no|id|table|count(er)?|rpm|speed|drehzahl|hz|freq\w*|"
     r"phase|angle|winkel|trigger|tacho\w*|temp\w*|displacement|velocity|position|weg)",
     re.IGNORECASE,
 )
@@ -22,8 +23,8 @@ OTHER = re.compile(
 SPEED = re.compile(r"hz|freq\w*|frequenz|rpm|speed|drehzahl", re.IGNORECASE)
 """Words in the name of a column that holds the speed of each reading."""
 
-FIRST = 1000
-"""Readings that tell of most columns that they are no clock."""
+FIRST, BLOCK = 1000, 2**20
+"""Readings that tell of most columns that they are no clock, and those of a long column that are looked at in turn."""
 
 MOST_SHOWN = 12
 """Columns that a message names."""
@@ -47,23 +48,31 @@ class Signal(NamedTuple):
 def is_counter(values: Array) -> bool:
     """Whether values rise in equal steps, as a counter or an even time stamp does."""
     steps = np.diff(values[:FIRST])
-    even = len(values) > 4 and bool(steps[0] > 0.0 and np.allclose(steps, steps[0], rtol=1e-6, atol=0.0))
-    return even and (len(values) <= FIRST or bool(np.allclose(np.diff(values), steps[0], rtol=1e-6, atol=0.0)))
+    if len(values) < 5 or not steps[0] > 0.0:
+        return False
+    return all(np.allclose(each, steps[0], rtol=1e-6, atol=0.0) for each in steps_of(values))
+
+
+def steps_of(values: Array) -> Iterator[Array]:
+    """Differences of successive values, block by block: those of a long column need as much memory as it."""
+    for first in range(0, max(1, len(values) - 1), BLOCK):
+        yield np.diff(values[first : first + BLOCK + 1])
 
 
 def is_clock(values: Array) -> bool:
     """Whether values never fall and rise on and on, as rounded time stamps do."""
     if np.any(np.diff(values[:FIRST]) < 0.0):
         return False
-    steps = np.diff(values)
-    steady = len(values) > 7 and bool(np.all(steps >= 0.0) and steps.mean() > 0.0)
-    return is_counter(values) or (steady and float(np.max(steps)) < 20.0 * float(steps.mean()))
+    size = len(values)
+    steady = size > 7 and bool(all(np.all(steps >= 0.0) for steps in steps_of(values)) and values[-1] > values[0])
+    mean = float(values[-1] - values[0]) / max(1, size - 1)
+    return is_counter(values) or (steady and max(float(steps.max()) for steps in steps_of(values)) < 20.0 * mean)
 
 
 def rises(values: Array) -> bool:
     """Whether values seldom fall, as instants do of which some are wrong."""
-    steps = np.diff(values)
-    return bool(np.count_nonzero(steps >= 0.0) >= 0.9 * len(steps))
+    rising = sum(int(np.count_nonzero(steps >= 0.0)) for steps in steps_of(values))
+    return bool(rising >= 0.9 * (len(values) - 1))
 
 
 def force_names(recording: Recording) -> list[str]:
@@ -128,7 +137,8 @@ def choose_force(
             )
         if not names:
             told = {name: _speaks_against(recording, name) for name in recording.columns} | dict(recording.texts)
-            why = _first([f"{name!r} {reason}" for name, reason in told.items()], "; ")
+            unread = {f"{name!r}, {recording.problems[name]}" for name in recording.problems.keys() - told.keys()}
+            why = _first([*(f"{name!r} {reason}" for name, reason in told.items()), *sorted(unread)], "; ")
             raise DiagnosisError(f"{recording.source} has no column that could be a force ({why}); use --column NAME")
         name = names[0]
     else:
@@ -156,8 +166,12 @@ def named_column(recording: Recording, column: str) -> str:
         text = next((name for name in recording.texts if name.casefold() in asked), None)
         if text is not None:
             raise DiagnosisError(f"{recording.source}: column {text!r} {recording.texts[text]}")
-        listed = _first(list(map(repr, dict.fromkeys([*recording.columns, *recording.problems]))), ", ")
-        raise DiagnosisError(f"{recording.source} has no column {column!r}; its columns of numbers: {listed}")
+        unread = next((name for name in recording.problems if name.casefold() in asked), None)
+        if unread is not None:
+            raise DiagnosisError(f"{recording.source}, column {unread!r}, {recording.problems[unread]}")
+        known = list(dict.fromkeys([*recording.columns, *recording.problems]))
+        told = nearest_or(f"its columns of numbers: {_first(list(map(repr, known)), ', ')}", column, known)
+        raise DiagnosisError(f"{recording.source} has no column {column!r}; {told}")
     return matching[0]
 
 
@@ -222,10 +236,10 @@ def _force(recording: Recording, name: str, unit: str | None, scale: str | None)
     if name in recording.problems:
         raise DiagnosisError(f"{recording.source}, {recording.problems[name]}")
     if name in recording.doubts and not unit:
-        raise DiagnosisError(f"{recording.source}: column {name!r} {recording.doubts[name]}; state it with --unit")
+        raise DiagnosisError(f"{recording.source}: column {name!r} {recording.doubts[name]}; state it: --read unit=N")
     values, written = recording.columns[name], as_unit(unit or "") or unit or recording.units.get(name, "")
     if written and written not in FORCES and written not in OTHERS and not scale:
-        told = "allowed" if unit else "give its unit with --unit"
+        told = "allowed" if unit else "state its unit: --read unit=N"
         listed = ", ".join([*FORCES, *sorted(OTHERS)])
         raise DiagnosisError(
             f"{recording.source}: column {name!r} is in {written}, no unit that is known; {told}: {listed}"
@@ -234,6 +248,8 @@ def _force(recording: Recording, name: str, unit: str | None, scale: str | None)
         raise DiagnosisError(f"{recording.source}: column {name!r} rises in equal steps and can't be a force")
     factor, target = FORCES.get(written or "N", 1.0), "N" if (written or "N") in FORCES else written
     shown = f"{written}" if written else "taken as N"
+    if unit and (named := recording.units.get(name, written)) != written:
+        shown = f"{written} as stated, instead of {named}"
     if scale:
         factor, target = calibration(scale, written)
         shown = f"{written or 'no unit'}, {scale.strip()}"
@@ -265,14 +281,16 @@ def calibration(scale: str, written: str) -> tuple[float, str]:
     except ValueError:
         size = 0.0
     if found is None or not 0.0 < size < math.inf:
-        raise DiagnosisError(f"--scale {scale!r} is no calibration; allowed: such as '100 mV/N', '20 N/V' or '50 N/FS'")
+        raise DiagnosisError(f"scale = {scale!r} is no calibration; allowed: such as '100 mV/N', '20 N/V' or '50 N/FS'")
     above, below = found[2], found[3] or written or "FS"
     for factor, quantity, electric in ((size, above, below), (1.0 / size, below, above)):
         turned = _same_kind(written, electric)
         if turned and (quantity in FORCES or quantity in OTHERS):
             force = quantity in FORCES
             return factor * turned * FORCES.get(quantity, 1.0), "N" if force else quantity
-    raise DiagnosisError(f"--scale {scale!r} does not fit readings in {written or 'no unit'}; state theirs with --unit")
+    raise DiagnosisError(
+        f"scale = {scale!r} does not fit readings in {written or 'no unit'}; state theirs: --read unit=V"
+    )
 
 
 def _same_kind(written: str, electric: str) -> float:

@@ -1,28 +1,25 @@
 r"""One peak a cycle of a time series: cut at the quietest phase of the cycle, largest modulus of each.
 
-The cycle is stated, taken from a tachometer, or estimated: the spectrum of a driven response has its lines at multiples
-of the driving frequency. A subharmonic response has lines between them, so that an estimate says that it is one.
+The cycle is stated, taken from a tachometer, or estimated.
 """
 
-import math
 from dataclasses import dataclass, replace
 
 import numpy as np
 
 from chaosgym.arrays import Array
-from chaosgym.errors import DiagnosisError, ParameterError
+from chaosgym.errors import DiagnosisError
+from chaosgym.numbers import number
 from chaosgym.recordings.columns import Signal, choose_force, named_column
+from chaosgym.recordings.cycle_estimate import FEWEST_SAMPLES, estimated_cycle, strongest_line_nearby
 from chaosgym.recordings.description import Sampled
 from chaosgym.recordings.read import Recording
 from chaosgym.recordings.sampling import Sampling, sampling
 from chaosgym.recordings.tachometer import Turns, turns_of
 from chaosgym.units import ALTERNATIVES, duration, parse_quantity
 
-FEWEST_SAMPLES = 8
-"""Samples that a cycle must have."""
-
-LONG, PER_CYCLE, BLOCK = 2**20, 16, 2**18
-"""Samples from which a spectrum is that of means, as many of them a cycle, and samples that are looked at in turn."""
+BLOCK = 2**18
+"""Samples that are looked at in turn."""
 
 PHASES = 64
 """Phases at which the quietest one is looked for."""
@@ -45,6 +42,8 @@ class CyclePeaks:
         Half width of what the sampling leaves open of a peak.
     period
         Cycle [s]; the mean one with a tachometer.
+    instants
+        Sampling of the series.
     notes
         How the cycle is known, what is missing, and doubts.
     condition
@@ -57,6 +56,7 @@ class CyclePeaks:
     starts: Array
     resolution: float
     period: float
+    instants: Sampling
     notes: tuple[str, ...]
     condition: str = ""
     sampled: Sampled | None = None
@@ -77,85 +77,8 @@ def cycle_period(text: str) -> float:
     [0.05, 0.05, 0.05]
     """
     value = parse_quantity("cycle", text, "s", {**ALTERNATIVES["Hz"], **ALTERNATIVES["s"]})
-    if value <= 0.0:
-        raise ParameterError(f"cycle = {text!r} is out of range; allowed: above 0")
+    number("cycle", value, 0.0, inside=True)
     return 1.0 / value if text.rstrip().endswith(tuple(ALTERNATIVES["Hz"])) else value
-
-
-def estimated_period(value: Array, step: float) -> float:
-    """Cycle [s] by the spectrum: the lowest line that most of the strong lines are multiples of.
-
-    Raises
-    ------
-    DiagnosisError
-        If no line stands out.
-    """
-    if len(value) > LONG:
-        coarse = estimated_period(value[:LONG], step)
-        if coarse < FEWEST_SAMPLES * step:
-            return coarse
-        several = max(1, int(coarse / step / PER_CYCLE))
-        return strongest_line(_averaged(value, several), several * step, coarse, 4.0 * coarse / (LONG * step))
-    size = len(value)
-    power = _power(value, 4 * size)
-    power[: 4 * 3] = 0.0
-    peak = int(np.argmax(power))
-    if power[peak] < 30.0 * float(np.mean(power)):
-        raise DiagnosisError(
-            "no line of the spectrum stands out, so the cycle can't be estimated; state it: --cycle '30 Hz'"
-        )
-    best = peak
-    for divisor in (2, 3, 4, 5):
-        place = round(peak / divisor)
-        near = slice(max(12, place - 4), place + 5)
-        if place > 16 and power[near].max() > 0.05 * power[peak]:
-            best = near.start + int(np.argmax(power[near]))
-    if best == len(power) - 1:  # the reading alternates with every sample
-        return 2.0 * step
-    return 4 * size * step / (best + _between(power, best))
-
-
-def strongest_line(value: Array, step: float, period: float, width: float) -> float:
-    """Cycle [s] of the largest line of the spectrum, within a share of the frequency of a cycle."""
-    padded = 4 * len(value)
-    power = _power(value, padded)
-    place = padded * step / period
-    low = max(1, int((1.0 - width) * place))
-    best = low + int(np.argmax(power[low : int((1.0 + width) * place) + 2]))
-    return padded * step / (best + _between(power, best))
-
-
-def _between(power: Array, best: int) -> float:
-    """Where a line lies between its place and the next one, by a parabola through the logarithms."""
-    left, middle, right = (math.log(max(float(power[best + k]), 1e-300)) for k in (-1, 0, 1))
-    return 0.5 * (left - right) / (left - 2.0 * middle + right) if left - 2.0 * middle + right else 0.0
-
-
-def _power(value: Array, padded: int) -> Array:
-    """Power of the spectrum of a signal without its mean, under a Hann window."""
-    signal = np.asarray(value, dtype=float)
-    return np.asarray(np.abs(np.fft.rfft((signal - signal.mean()) * np.hanning(len(signal)), padded)) ** 2)
-
-
-def _averaged(value: Array, several: int) -> Array:
-    """Means of several samples in turn."""
-    whole = len(value) // several * several
-    return np.asarray(value[:whole].reshape(-1, several).mean(axis=1, dtype=float))
-
-
-def strongest_line_nearby(value: Array, step: float, period: float) -> float | None:
-    """Cycle [s] of a line of the spectrum that lies beside the stated cycle, within 5 %; None if the statement fits."""
-    if len(value) > LONG and (several := int(period / step / PER_CYCLE)) > 1:
-        value, step = _averaged(value, several), several * step
-    padded = 8 * len(value)
-    power = _power(value, padded)
-    place = padded * step / period
-    low, high = int(0.95 * place), int(1.05 * place) + 2
-    if low < 16 or high >= len(power):
-        return None
-    peak = low + int(np.argmax(power[low:high]))
-    stands_out = power[peak] > 1e-3 * power[8:].max() and low < peak < high - 1
-    return padded * step / peak if stands_out and abs(peak - place) > 2.0 else None
 
 
 def cycle_peaks(
@@ -170,7 +93,7 @@ def cycle_peaks(
     instants
         Its sampling.
     period
-        Cycle [s]; estimated from the spectrum if neither it nor ``turns`` is given.
+        Cycle [s]; estimated from the series if neither it nor ``turns`` is given.
     turns
         Of the shaft, by a tachometer: a turn is a cycle.
 
@@ -179,7 +102,7 @@ def cycle_peaks(
     DiagnosisError
         If a cycle has fewer than 8 samples, or the series is shorter than one cycle.
     """
-    missing, value = ~np.isfinite(value), _filled(value)
+    missing, value = ~np.isfinite(value), filled(value)
     notes, condition = [f"missing samples: {gap}" for gap in instants.gaps], ""
     if turns is not None:
         starts = turns.starts
@@ -187,10 +110,10 @@ def cycle_peaks(
         notes.append(f"cycle from the tachometer: {duration(cycle, 6)} on average, {len(starts) - 1} cycles")
         notes += filter(None, [turns.told])
     elif period is None:
-        cycle = estimated_period(value, instants.step)
+        cycle, origin = estimated_cycle(value, instants.step)
         condition = f"if the cycle is {duration(cycle)}"
         notes.append(
-            f"cycle estimated from the spectrum: {duration(cycle, 6)} ({1.0 / cycle:.5g} Hz); state it (--cycle) "
+            f"cycle estimated from {origin}: {duration(cycle, 6)} ({1.0 / cycle:.5g} Hz); state it (--read cycle=...) "
             "if that is not the speed"
         )
     else:
@@ -214,10 +137,10 @@ def cycle_peaks(
     if len(peaks) == 0:
         raise DiagnosisError(f"the series holds no whole cycle of {duration(cycle)}")
     sampled = Sampled(cycle / instants.step, 1.0 / cycle) if turns is None else None
-    return CyclePeaks(peaks, kept, spread, cycle, tuple(notes), condition, sampled)
+    return CyclePeaks(peaks, kept, spread, cycle, instants, tuple(notes), condition, sampled)
 
 
-def _filled(value: Array) -> Array:
+def filled(value: Array) -> Array:
     """The signal with straight lines over what is missing."""
     there = np.isfinite(value)
     if there.all():

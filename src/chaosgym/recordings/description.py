@@ -25,6 +25,13 @@ BURSTS, STRETCH = 5.0, 20
 """Correlation of the sizes of successive scatter, times the root of the cycles, from which it comes in bursts, and the
 cycles over which their standard deviation is told."""
 
+NEAR, CURVED, SLOW, EXPLAINED = 1.2, 4, 0.3, 0.95
+"""Where deviations count as small, in their median; terms of the map there; growth a cycle [1] up to which they lead to
+bursts; and share of the next readings that the map accounts for."""
+
+FAR, QUIET, FEWEST_QUIET = 2.5, 8, 4
+"""How far bursts go, as a multiple of small deviations; cycles of a quiet stretch, and fewest of them."""
+
 
 class Sampled(NamedTuple):
     """How a series was sampled: samples a cycle, and cycles a second."""
@@ -74,7 +81,7 @@ def describe(
     if line is not None:
         features += _line(line, len(found.readings), sampled)
     elif not changes:
-        features += [*_pattern(found), *_levels(found), *_bursts(found)]
+        features += [*_pattern(found), *_levels(found), *_bursts(found), *_growth(found)]
     if not changes:
         features += _trends(found, line)
     return tuple(features)
@@ -184,3 +191,39 @@ def _bursts(found: Scatter) -> Iterator[Feature]:
         parts = [float(np.std(part)) for part in np.array_split(rest, size // STRETCH)]
         text = f"its scatter comes in bursts: {newton(min(parts))} to {newton(max(parts))} over {STRETCH} cycles"
         yield Feature("bursts", text, {"least": min(parts), "largest": max(parts)})
+
+
+def _growth(found: Scatter) -> Iterator[Feature]:
+    """Growth of small deviations from a level up to bursts: the slope of the map of successive readings there."""
+    values, middle = found.readings, float(np.median(found.readings))
+    now, following = values[:-1], values[1:]
+    for _ in range(3):
+        near = NEAR * float(np.median(np.abs(values - middle)))
+        small = np.abs(now - middle) < near
+        if np.count_nonzero(small) < QUIET * FEWEST_QUIET:
+            return
+        design = ((now[small] - middle) / near)[:, None] ** np.arange(CURVED)
+        weights = np.linalg.lstsq(design, following[small], rcond=None)[0]
+        slope = float(weights[1]) / near
+        if abs(1.0 - slope) > 0.5 * SLOW:  # towards the level that the map leaves where it is
+            middle += float(np.clip((weights[0] - middle) / (1.0 - slope), -0.5 * near, 0.5 * near))
+    rest = following[small] - design @ weights
+    error = float(np.std(rest) * math.sqrt(np.linalg.pinv(design.T @ design)[1, 1])) / near
+    away = np.abs(values - middle)
+    stretches = np.diff(np.flatnonzero(np.concatenate([[True], away > near, [True]]))) - 1
+    stretches = stretches[stretches >= QUIET]
+    grows = 1.0 + 3.0 * error < abs(slope) < 1.0 + SLOW
+    accounted = float(np.var(rest)) < (1.0 - EXPLAINED) * float(np.var(following[small]))
+    if grows and accounted and away.max() > FAR * near and len(stretches) >= FEWEST_QUIET:
+        growth, quiet = abs(slope) - 1.0, float(np.mean(stretches))
+        text = (
+            f"deviations from {newton(middle)} grow by {100.0 * growth:.2g} % a cycle up to bursts, after "
+            f"{len(stretches)} quiet stretches of {quiet:.3g} cycles on average"
+        )
+        figures = {
+            "growth_per_cycle": growth,
+            "level": middle,
+            "stretches": len(stretches),
+            "mean_stretch_cycles": quiet,
+        }
+        yield Feature("growth of bursts", text, figures)

@@ -45,8 +45,17 @@ apart at least: nearer ones are alike in slow noise too."""
 FAR_APART = 6.0
 """Robust standard deviations by which neighbours on a curve differ where it jumps."""
 
-FRACTIONS = 4
-"""A line that is a fraction of so many cycles, or of so many patterns, is a pattern itself."""
+FRACTIONS, READINGS_OF_ONE = 4, 8
+"""A line that is a fraction of so many cycles, or of so many patterns, is a pattern itself. So it is of more cycles
+where their square is less than the readings over the latter: one line in fifty lies there by chance."""
+
+MULTIPLES = 24.0
+"""Chi-squared of the multiples of a line from which they are no chance."""
+
+
+def fractions(size: int) -> int:
+    """Cycles of which a line is no fraction by chance in a record of so many."""
+    return max(FRACTIONS, math.isqrt(size // READINGS_OF_ONE))
 
 
 def pattern_variances(values: Array, longest: int) -> Array:
@@ -117,6 +126,8 @@ class Line:
         Standard deviation that it leaves.
     pure
         Whether it is a sinusoid.
+    alone
+        Whether none of its multiples is seen at all, as of what is added from outside.
     """
 
     period: int
@@ -124,6 +135,7 @@ class Line:
     share: float
     rest: float
     pure: bool
+    alone: bool
 
 
 def line_of(values: Array) -> Line | None:
@@ -142,13 +154,15 @@ def line_of(values: Array) -> Line | None:
         if first > (1.0 - FUNDAMENTAL) * whole or not _is_own(turns, period, size):
             continue
         turns, rest = _without_harmonics(residual, turns, HARMONICS)
-        pure = first - float(np.var(rest)) < PURE * whole + 4.0 * HARMONICS * float(np.var(rest)) / size
+        multiples, by_chance = first - float(np.var(rest)), float(np.var(rest)) / size
+        pure = multiples < PURE * whole + 4.0 * HARMONICS * by_chance
         if not pure and not _is_own(turns, period, size, 2 * HARMONICS + 1):
             continue  # so many harmonics make any pattern of so many cycles
         for rate, left, share in ((turns, rest, LINE_REST), (*_curve(residual, turns), CURVE_REST)):
             if np.var(left) < share * whole and is_random(left):
                 held = (whole - float(np.var(left))) / float(np.var(values))
-                return Line(period, 1.0 / rate, held, float(np.std(left)), pure)
+                alone = multiples < MULTIPLES * by_chance
+                return Line(period, 1.0 / rate, held, float(np.std(left)), pure, alone)
     return None
 
 
@@ -166,9 +180,10 @@ def _rate(residual: Array) -> float:
     return float(np.argmax(power)) / (16 * size)
 
 
-def _is_own(turns: float, period: int, size: int, fractions: int = FRACTIONS) -> bool:
+def _is_own(turns: float, period: int, size: int, most: int = FRACTIONS) -> bool:
     """Whether a rate is fast enough to be sure of, and no small fraction of a cycle or of the pattern beneath."""
-    whole = {*range(1, fractions + 1), *(period * k for k in range(1, FRACTIONS + 1))}
+    most = max(most, fractions(size))
+    whole = {*range(1, most + 1), *(period * k for k in range(1, FRACTIONS + 1))}
     return turns * size >= TURNS and all(abs(turns * k - round(turns * k)) * size > 0.5 * k for k in whole)
 
 

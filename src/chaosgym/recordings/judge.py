@@ -17,12 +17,15 @@ from numpy.typing import ArrayLike
 
 from chaosgym.arrays import Array
 from chaosgym.errors import DiagnosisError
+from chaosgym.numbers import number
 from chaosgym.recordings.description import Sampled, describe, is_sampling_beat
 from chaosgym.recordings.fixed_motion import Line, line_of
 from chaosgym.recordings.measured_verdict import MeasuredVerdict
-from chaosgym.recordings.scatter import judge_scatter, newton, scatter_of
+from chaosgym.recordings.scatter import newton, scatter_of
+from chaosgym.recordings.scatter_verdict import judge_scatter
 from chaosgym.series.noise import FEW_OUTLIERS, SensorError, equal_interval, find_change, quantum, repair, stated_error
-from chaosgym.series.two_step import INITIAL_TRANSIENT, two_step_test
+from chaosgym.series.transient_chaos import INITIAL_TRANSIENT
+from chaosgym.series.two_step import two_step_test
 from chaosgym.series.verdict import Diagnosis, undetermined
 
 FEWEST_CYCLES, SHORT_RECORD = 8, 16
@@ -36,6 +39,9 @@ LARGEST_FORCE, SMALLEST_FORCE = 1e9, 1e-100
 
 MOST_PARTS = 3
 """How often a record is cut in two."""
+
+SEEN_AGAIN, FEWEST_AGAIN, FAR = 3, 8, 3.0
+"""Periods, and readings, on a pattern after which it is left, not passed by; and how many widths away that is."""
 
 LITTLE = 0.3
 """Share of its standard deviation that a motion leaves which holds over a change."""
@@ -79,6 +85,7 @@ def judge_peaks(
     >>> judge_peaks(np.tile([40.0, 60.0], 150) + 0.1 * noise, sensor_sigma=0.1).diagnosis.words
     'periodic, period 2'
     """
+    number("resolution", resolution, 0.0, error=DiagnosisError)
     if np.ndim(peaks) == 2:
         from chaosgym.recordings.sensors import judge_together
 
@@ -112,6 +119,8 @@ def judge_peaks(
     on_line = line_of(readings)
     fixed = on_line is not None and on_line.rest < LITTLE * float(np.std(readings))
     whole, outliers, gaps = (readings, (), ()) if fixed else repair(readings)
+    if gaps and _judge_part(whole, told, max(resolution, 0.5 * quantum(readings))).diagnosis.nature == "chaotic":
+        whole, outliers, gaps = readings, (), ()  # what was filled in does not repeat
     why = unsteady(whole)
     if why:
         return MeasuredVerdict(undetermined(f"not a steady response: {why}", readings), told, outliers=outliers)
@@ -145,6 +154,9 @@ def judge_peaks(
         line = None
     if line is not None and is_sampling_beat(line, len(whole), sampled):
         verdict = _of_sampling(verdict, line)
+    if told is not None and _left_its_pattern(whole, verdict.diagnosis, 2.0 * told.half_width):
+        left = (verdict.diagnosis.settle_cycle or 0) + 1
+        verdict = _under(verdict, f"if it does not leave its pattern again, as before cycle {left}")
     heights = readings[np.array(outliers, int) - 1] - np.median(readings)
     seen = () if found is None else describe(whole, found, line, outliers, heights, changes, sampled)
     if verdict.diagnosis.nature == "undetermined" and any(feature.kind == "levels" for feature in seen):
@@ -206,13 +218,36 @@ def _parts(readings: Array, floor: float, cuts: int) -> list[Array]:
     return [*_parts(readings[:place], floor, cuts - 1), *_parts(readings[place:], floor, cuts - 1)]
 
 
-def _apart_from(verdict: MeasuredVerdict, condition: str) -> MeasuredVerdict:
+def _under(verdict: MeasuredVerdict, condition: str) -> MeasuredVerdict:
     """The verdict under one more condition, if it is one."""
     if verdict.diagnosis.nature == "undetermined":
         return verdict
     conditions = " and ".join(filter(None, (condition, verdict.diagnosis.condition)))
-    diagnosis = replace(verdict.diagnosis, condition=conditions)
-    return replace(verdict, diagnosis=diagnosis, random=verdict.random or diagnosis.nature == "periodic")
+    return replace(verdict, diagnosis=replace(verdict.diagnosis, condition=conditions))
+
+
+def _apart_from(verdict: MeasuredVerdict, condition: str) -> MeasuredVerdict:
+    """The verdict without single readings: what is left of a pattern counts as random scatter."""
+    random = verdict.random or verdict.diagnosis.nature == "periodic"
+    return replace(_under(verdict, condition), random=random)
+
+
+def _left_its_pattern(readings: Array, found: Diagnosis, near: float) -> bool:
+    """Whether a response that repeats at the end was on the same pattern before, and left it: so do laminar phases.
+
+    A response that settles comes near its pattern once. ``near`` [N] is how close readings of one pattern are.
+    """
+    period, settled = found.period, found.settle_cycle
+    if found.nature != "periodic" or period is None or not settled:
+        return False
+    pattern = np.array([np.median(readings[settled + phase :: period]) for phase in range(period)])
+    least = max(SEEN_AGAIN * period, FEWEST_AGAIN)
+    for shift in range(period):
+        off = np.abs(readings[:settled] - pattern[(np.arange(settled) + shift) % period])
+        quiet = np.flatnonzero(np.convolve(off <= near, np.ones(least), "valid") == least)
+        if len(quiet) and np.max(off[quiet[0] + least :], initial=0.0) > FAR * near:
+            return True
+    return False
 
 
 def _accounts_for(verdict: MeasuredVerdict, readings: Array) -> bool:

@@ -71,14 +71,6 @@ class SweepTypes(NamedTuple):
     regions: tuple[Region, ...]
     beginnings: tuple[Beginning, ...]
 
-    def as_dict(self) -> dict[str, Any]:
-        """Return plain values for JSON."""
-        return {
-            "regions": [region._asdict() for region in self.regions],
-            "speeds": [speed._asdict() for speed in self.speeds],
-            "beginnings": [one._asdict() for one in self.beginnings],
-        }
-
 
 def sweep_types(
     speeds: ArrayLike, peaks: ArrayLike, *, sensor_error: float | None = None, sensor_sigma: float | None = None
@@ -110,7 +102,7 @@ def sweep_types(
     """
     error = stated_error(sensor_error, sensor_sigma)
     if error is None:
-        raise DiagnosisError("a sweep needs the sensor's error: --sensor-error or --sensor-sigma (3 N in the thesis)")
+        raise DiagnosisError("a sweep needs the sensor's error: --sensor-error (3 N in the thesis)")
     at, force = np.asarray(speeds, dtype=float), np.asarray(peaks, dtype=float)
     runs = _runs(at, force)
     judged = [judged_speed(run, error.half_width, sensor_error, sensor_sigma) for _, run in runs]

@@ -3,6 +3,7 @@
 from dataclasses import dataclass
 from typing import Any, NamedTuple
 
+from chaosgym.plain import Result
 from chaosgym.series.noise import SensorError
 from chaosgym.series.verdict import Diagnosis
 
@@ -20,7 +21,7 @@ class Feature(NamedTuple):
 
 
 @dataclass(frozen=True)
-class MeasuredVerdict:
+class MeasuredVerdict(Result):
     """The verdict on a measured record.
 
     Attributes
@@ -51,6 +52,11 @@ class MeasuredVerdict:
         Unit of the readings.
     """
 
+    shows = (
+        "sensor_error=error outliers gaps changes notes scatter coefficient_of_variation random unit description "
+        "condition=diagnosis.condition"
+    )
+
     diagnosis: Diagnosis
     error: SensorError | None
     scatter: float | None = None
@@ -70,9 +76,4 @@ class MeasuredVerdict:
 
     def as_dict(self) -> dict[str, Any]:
         """Return plain values for JSON: those of the diagnosis, and what is known of the readings."""
-        error = None if self.error is None else self.error._asdict()
-        own: dict[str, Any] = {n: list(getattr(self, n)) for n in ("outliers", "gaps", "changes", "notes")}
-        own |= {name: getattr(self, name) for name in ("scatter", "coefficient_of_variation", "random", "unit")}
-        own["description"] = [feature.as_dict() for feature in self.description]
-        own["condition"] = self.diagnosis.condition
-        return {**self.diagnosis.as_dict(), "sensor_error": error, **own}
+        return {**self.diagnosis.as_dict(), **super().as_dict()}

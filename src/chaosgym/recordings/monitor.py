@@ -15,7 +15,7 @@ import math
 from collections import deque
 from collections.abc import Callable, Iterator
 from contextlib import AbstractContextManager
-from dataclasses import asdict, dataclass
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, Literal, TextIO
 
@@ -23,6 +23,8 @@ import numpy as np
 
 from chaosgym.arrays import Array, Indices
 from chaosgym.errors import ChaosgymError, DiagnosisError
+from chaosgym.numbers import number, whole
+from chaosgym.plain import Result
 from chaosgym.series.noise import predictability
 from chaosgym.series.stroboscopic import irregularity
 
@@ -111,7 +113,7 @@ class RepeatSums:
 
 
 @dataclass(frozen=True)
-class Watch:
+class Watch(Result):
     """State of the monitor after a cycle.
 
     Attributes
@@ -137,12 +139,8 @@ class Watch:
     amplitude: float | None
     event: Event
 
-    def as_dict(self) -> dict[str, Any]:
-        """Return plain values for JSON."""
-        return asdict(self) | {"peak": None if math.isnan(self.peak) else self.peak}
-
     def __str__(self) -> str:
-        state = {None: "waiting", False: "regular", True: "IRREGULAR"}[self.alarm]
+        state = {None: "waiting", False: "no alarm", True: "IRREGULAR"}[self.alarm]
         size = "" if self.amplitude is None else f"  amplitude {self.amplitude:8.2f} N"
         event = f"  <- {self.event}" if self.event else ""
         return f"{self.cycle:6d}  {self.peak:9.2f} N  {state:9s}  level {self.level:4.2f}{size}{event}"
@@ -160,7 +158,7 @@ class Monitor:
     ----------
     sensor_error
         Largest error of a peak [N], above 0. The first 64 cycles tell the scatter of the process, if it is larger or
-        no error is stated; without an error they are taken for regular.
+        no error is stated: chaos from the start on may be taken for it.
     longest_period
         Longest period [cycles] that counts as repeating; the first verdict comes after twice as many cycles.
     on_event
@@ -186,11 +184,9 @@ class Monitor:
         longest_period: int = LAGS,
         on_event: Callable[[Watch], None] | None = None,
     ) -> None:
-        if sensor_error is not None and not (math.isfinite(sensor_error) and sensor_error > 0.0):
-            raise DiagnosisError(f"sensor_error = {sensor_error:g} N is out of range; allowed: above 0")
-        if not 1 <= longest_period <= 64:
-            raise DiagnosisError(f"longest_period = {longest_period} is out of range; allowed: 1 to 64")
-        self.longest_period = longest_period
+        if sensor_error is not None:
+            number("sensor_error", sensor_error, 0.0, unit="N", inside=True, error=DiagnosisError)
+        self.longest_period = whole("longest_period", longest_period, 1, 64, error=DiagnosisError)
         self.stated = None if sensor_error is None else float(sensor_error)
         self.on_event = on_event
         self.reset()
@@ -334,7 +330,7 @@ class EventLog(AbstractContextManager["EventLog"]):
             try:
                 self._file = open(path, "a", encoding="utf-8")  # noqa: SIM115
             except OSError as error:
-                raise ChaosgymError(f"{path} can't be written: {error}; choose another file") from error
+                raise ChaosgymError(f"{path} can't be written: {error.strerror}; choose another file") from error
             if self._file.tell() == 0:
                 self._write("cycle,event,peak_N,amplitude_N")
 

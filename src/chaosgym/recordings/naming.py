@@ -1,14 +1,15 @@
 """Names, units, rates and speeds of the columns of a recording: decided here, once, for every format."""
 
 import re
-from collections.abc import Mapping
+from collections import Counter
+from collections.abc import Mapping, Sequence
 from typing import Any, NamedTuple
 
 import numpy as np
 
 from chaosgym.arrays import Array
 from chaosgym.recordings.quantities import RATES, TIMES, as_unit, same_unit, split_unit
-from chaosgym.recordings.raw import Column, Raw
+from chaosgym.recordings.raw import LONGEST, Raw, RawColumn, short
 
 MOST_MISSING = 0.02
 """Share of the readings that a recorder may have marked as missing."""
@@ -18,7 +19,8 @@ RATE = re.compile(
     re.IGNORECASE,
 )
 STEP = re.compile(
-    r"t_?s|(sampl\w*[ _]?)(interval|period|time)|abtastintervall|delta[ _]?[xt]?|[xt][ _]?(increment|delta|step)|"
+    r"t_?s|t_?interval|(sampl\w*[ _]?)(interval|period|time)|abtastintervall|delta[ _]?[xt]?|"
+    r"[xt][ _]?(inc|increment|delta|step)|clock|"
     r"wf_increment|increment|time[ _]?step|dx|dt",
     re.IGNORECASE,
 )
@@ -26,7 +28,7 @@ UNIT = re.compile(r"unit_?string|(ni_?)?unit_?description|units?|einheit(en)?|qu
 SPEED = re.compile(r".*rpm", re.IGNORECASE)
 """Names under which files keep the sampling rate, the interval, the unit of a column, and the speed of the shaft."""
 
-DECIMAL = r"[+-]?\d+(?:[.,]\d+)?(?:[eE][+-]?\d+)?"
+DECIMAL = r"[+-]?\d++(?:[.,]\d++)?+(?:[eE][+-]?\d++)?+"
 
 
 class Named(NamedTuple):
@@ -51,7 +53,8 @@ def named(raw: Raw) -> Named:
     sizes = [len(column.values) for column in raw.columns if column.values is not None]
     size = max(set(sizes), key=lambda n: (n * sizes.count(n), n), default=0)
     left = [column.title for column in raw.columns if column.values is not None and len(column.values) != size]
-    one = Named({}, {}, {}, {}, {}, rates_of(raw.stated), _speeds(raw.stated), left)
+    stated = short(raw.stated)
+    one = Named({}, {}, {}, {}, {}, rates_of(stated), _speeds(stated), left)
     columns = [column for column in raw.columns if column.values is None or len(column.values) == size]
     for name, column in zip(_names(columns), columns, strict=True):
         if column.values is None:
@@ -80,7 +83,7 @@ def rates_of(stated: Mapping[str, Any]) -> dict[str, float]:
         for name, unit in map(split_unit, (key, re.split(r"[./]", key)[-1])):
             if RATE.fullmatch(name) and (number := quantity(value, unit, RATES)):
                 rates[key] = number
-            elif STEP.fullmatch(name) and (number := quantity(value, unit, TIMES)):
+            elif (STEP.fullmatch(name) or (unit and name == "interval")) and (number := quantity(value, unit, TIMES)):
                 rates[key] = 1.0 / number
     return rates
 
@@ -88,7 +91,9 @@ def rates_of(stated: Mapping[str, Any]) -> dict[str, float]:
 def quantity(value: Any, unit: str, sizes: Mapping[str, float]) -> float | None:
     """Number above 0 with its unit, in Hz or s; None if the value is none."""
     written = (
-        re.fullmatch(rf"(?:Analog:)?\s*({DECIMAL})\s*(\S*?)\.?", value.strip()) if isinstance(value, str) else None
+        re.fullmatch(rf"(?:Analog:)?\s*({DECIMAL})\s*(\S*)", value.strip().removesuffix("."))
+        if isinstance(value, str)
+        else None
     )
     if isinstance(value, str):
         if written is None:
@@ -103,22 +108,25 @@ def quantity(value: Any, unit: str, sizes: Mapping[str, float]) -> float | None:
     return number * size if 1e-12 < number * size < 1e12 else None
 
 
-def _names(columns: list[Column]) -> list[str]:
+def _names(columns: list[RawColumn]) -> list[str]:
     """Name of each column: its title without the unit where that tells columns apart, else as written."""
-    short = [_name(split_unit(column.title)[0], column) for column in columns]
-    names: list[str] = []
-    for column, name in zip(columns, short, strict=True):
-        title = name if short.count(name) == 1 else _name(column.title, column)
-        again = (f"{title} ({k})" for k in range(2, len(columns) + 2))
-        names.append(next(one for one in (title, *again) if one not in names))
-    return names
+    plain = [_name(split_unit(column.title)[0], column) for column in columns]
+    alike, used = Counter(plain), Counter[str]()
+    names: dict[str, None] = {}
+    for column, name in zip(columns, plain, strict=True):
+        title = one = name if alike[name] == 1 else _name(column.title, column)
+        while one in names:
+            used[title] += 1
+            one = f"{title} ({used[title] + 1})"
+        names[one] = None
+    return list(names)
 
 
-def _name(title: str, column: Column) -> str:
+def _name(title: str, column: RawColumn) -> str:
     return f"{column.group}/" * bool(column.group) + title + f" {column.place}" * bool(column.place)
 
 
-def _unit(column: Column) -> tuple[str, str]:
+def _unit(column: RawColumn) -> tuple[str, str]:
     """(unit of a column, why it is in doubt)."""
     within = split_unit(column.title)[1]
     beside = next((_text(value) for key, value in column.stated.items() if UNIT.fullmatch(key) and _text(value)), "")
@@ -130,7 +138,7 @@ def _unit(column: Column) -> tuple[str, str]:
 
 
 def _text(value: Any) -> str:
-    return value.decode(errors="replace").strip() if isinstance(value, bytes) else str(value or "").strip()
+    return (value[:LONGEST].decode(errors="replace") if isinstance(value, bytes) else str(value or "")).strip()
 
 
 def _speeds(stated: Mapping[str, Any]) -> dict[str, float]:
@@ -146,10 +154,10 @@ def _without_end(values: Array) -> Array:
     return values[: int(np.max(np.flatnonzero(~np.isnan(values)), initial=-1)) + 1]
 
 
-def _problem(values: Array, lines: tuple[int, ...]) -> str:
+def _problem(values: Array, lines: Sequence[int]) -> str:
     """Why readings can't be used: too many of them are no finite numbers."""
     bad = np.flatnonzero(~np.isfinite(values))
     if len(bad) <= MOST_MISSING * len(values):
         return ""
-    place = f"line {lines[bad[0]]}" if lines else f"reading {bad[0] + 1}"
+    place = f"line {lines[bad[0]]}" if len(lines) else f"reading {bad[0] + 1}"
     return f"{place}: {str(values[bad[0]])!r} is not a finite number"

@@ -13,12 +13,14 @@ J. Blough, D. Brown, H. Vold, The time variant discrete Fourier transform as an 
 972006 (1997).
 """
 
+from functools import cached_property
 from typing import Any, NamedTuple
 
 import numpy as np
 
 from chaosgym.arrays import Array
 from chaosgym.errors import DiagnosisError
+from chaosgym.recordings.fixed_lines import FixedPower
 from chaosgym.recordings.tachometer import FEWEST_TURNS, Turns
 
 FRAME = FEWEST_TURNS
@@ -32,6 +34,9 @@ OVERSAMPLED = 4
 
 MOST_LINES, FAINT = 8, 0.01
 """Lines that are named, and the share of the largest below which none is."""
+
+LOUDER = 4.0
+"""Power of an order in that of what lies at the frequencies that it passes: noise may grow by less with the speed."""
 
 BY_CHANCE = 1e-3
 """Probability that a spectrum of noise alone names a line (assumed)."""
@@ -153,7 +158,8 @@ class AngleSignal:
         least = np.maximum(FAINT * typical.max(), _by_chance(typical, len(self.begins)))
         # the first two lines of a Hann window are those of a drift
         places = 2 + np.flatnonzero((typical > around)[2:] & (typical > least)[2:])
-        places = places[np.argsort(-typical[places], kind="stable")][:MOST_LINES]
+        places = places[np.argsort(-typical[places], kind="stable")]
+        places = np.array([place for place in places if self._is_order(spectra, int(place))][:MOST_LINES], dtype=int)
         orders = np.array([_between(spectra.orders, typical, int(place)) for place in places])
         tracks = self.amplitude(orders).T
         found = []
@@ -162,6 +168,24 @@ class AngleSignal:
             rms = float(np.sqrt(np.mean(track**2)))
             found.append(OrderLine(order, float(track[top]), float(spectra.speeds[top]), rms, track))
         return found
+
+    @cached_property
+    def fixed(self) -> FixedPower:
+        """What it holds at fixed frequencies."""
+        return FixedPower(self.value, self.speed, float(np.median(np.diff(self.time))))
+
+    def _is_order(self, spectra: OrderSpectra, place: int) -> bool:
+        """Whether a line of the orders is more than what lies at the frequencies that it passes."""
+        lasts = FRAME / spectra.speeds
+        share, frames = self.fixed.exceeded(spectra.orders[place], spectra.speeds, spectra.amplitude[:, place], lasts)
+        return frames == 0 or share > max(LOUDER, _most_by_chance(len(spectra.orders), frames))
+
+
+def _most_by_chance(orders: int, frames: int) -> float:
+    """Mean of as many powers of noise as there are frames, over their own mean, that none of all orders exceeds."""
+    from scipy.stats import gamma
+
+    return float(gamma.isf(BY_CHANCE / orders, frames) / frames)
 
 
 def _by_chance(typical: Array, frames: int) -> Array:

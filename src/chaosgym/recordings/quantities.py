@@ -92,19 +92,48 @@ def split_unit(title: str) -> tuple[str, str]:
     (('Force', 'kN'), ('time', 'ms'), ('Channel A', ''))
     """
     text = title.strip()
-    if written := re.fullmatch(r"(.*?)[\s_]*[\[(]\s*([^\])]*?)\s*[\])]", text):
-        unit = as_unit(written[2])
-        if unit or "[" in text:
-            return written[1].strip() or text, unit or written[2]
-    if (written := re.fullmatch(r"(.+?)\s*/\s*(\S+)", text)) and as_unit(written[2]):
-        return written[1].strip(), as_unit(written[2])
-    if written := re.fullmatch(r"(.+?)(?:_|\s+in\s+)(\S+)", text):
-        unit = as_unit(written[2])
-        allowed = unit in SUFFIXES if written[2] in UNITS else len(written[2]) > 2
-        if unit and (allowed or (unit == "min" and CLOCK.fullmatch(written[1]))):
-            return written[1].strip(), unit
+    name, within = _bracketed(text)
+    if within is not None and (as_unit(within) or "[" in text):
+        return name.strip() or text, as_unit(within) or within
+    name, word = _parted(text, "/", "/")
+    if as_unit(word):
+        return name.strip(), as_unit(word)
+    name, word = _parted(text, "in", "_")
+    unit = as_unit(word)
+    allowed = unit in SUFFIXES if word in UNITS else len(word) > 2 or unit in RATES
+    if unit and (allowed or (unit == "min" and CLOCK.fullmatch(name))):
+        return name.strip(), unit
     unit = as_unit(text)
     return text, unit if unit in TIMES and len(text) > 1 and text.casefold() != "min" else ""
+
+
+def _bracketed(text: str) -> tuple[str, str | None]:
+    """What stands before brackets that end a text, without blanks and _, and what they hold; None without brackets.
+
+    The search runs once over the text: a pattern with two parts of any length takes the square of it.
+    """
+    if not text.endswith(("]", ")")):
+        return text, None
+    start = max(text.rfind("]", 0, -1), text.rfind(")", 0, -1)) + 1
+    opening = min((place for place in (text.find("[", start), text.find("(", start)) if place >= 0), default=-1)
+    if opening < 0:
+        return text, None
+    last = next(
+        (place for place in range(opening - 1, -1, -1) if not (text[place].isspace() or text[place] == "_")), -1
+    )
+    return text[: last + 1], text[opening + 1 : -1].strip()
+
+
+def _parted(text: str, apart: str, mark: str) -> tuple[str, str]:
+    """A name and the last word of a text, behind a separator: ``F / N`` or ``F/N``; empty words if there is none."""
+    words = text.rsplit(maxsplit=1)
+    before, last = (words[0], words[1]) if len(words) == 2 else ("", text)
+    name = before.removesuffix(apart)
+    if name != before and name.strip() and (apart == mark or name[-1].isspace()):
+        return name.rstrip(), last
+    start = len(text) - len(last)
+    place = text.find(mark, max(start, 1))
+    return (text[:place], text[place + 1 :]) if 0 < place < len(text) - 1 else ("", "")
 
 
 def same_unit(one: str, other: str) -> bool:

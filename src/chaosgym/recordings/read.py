@@ -1,8 +1,8 @@
 """Recorders' files as columns of numbers with names and units, whatever wrote them.
 
-CSV with any common delimiter, decimal comma, UTF-8 or UTF-16, comments and a heading; Parquet, NumPy ``.npy``, MATLAB
-``.mat``, WAV; universal files (UFF 58, extra ``[uff]``); TDMS, MDF, HDF5, MATLAB 7.3, Excel and FLAC (extra
-``[recordings]``). Formats are told by their first bytes.
+CSV with any common delimiter, decimal comma, UTF-8 or UTF-16, comments and a heading; Parquet, NumPy ``.npy`` and
+``.npz``, JSON, MATLAB ``.mat``, WAV; universal files (UFF 58, extra ``[uff]``); TDMS, MDF, HDF5, MATLAB 7.3, Excel and
+FLAC (extra ``[recordings]``). Formats are told by their first bytes.
 """
 
 import hashlib
@@ -11,7 +11,7 @@ import os
 import select
 import stat
 import sys
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 
@@ -22,7 +22,7 @@ from chaosgym.errors import DiagnosisError
 from chaosgym.recordings.formats import format_of
 from chaosgym.recordings.naming import Named, named
 from chaosgym.recordings.quantities import split_unit
-from chaosgym.recordings.raw import Data, Parts, Raw
+from chaosgym.recordings.raw import Data, Parts, Raw, TooMuch, pieces
 
 
 @dataclass(frozen=True)
@@ -63,7 +63,7 @@ class Recording:
     sha256: str
     units: Mapping[str, str] = field(default_factory=dict)
     problems: Mapping[str, str] = field(default_factory=dict)
-    lines: tuple[int, ...] = ()
+    lines: Sequence[int] = ()
     rates: Mapping[str, float] = field(default_factory=dict)
     speeds: Mapping[str, float] = field(default_factory=dict)
     texts: Mapping[str, str] = field(default_factory=dict)
@@ -129,11 +129,19 @@ def read_recording(source: str | Path, *, sheet: str | None = None, column: str 
     return Recording(
         source=name,
         form=raw.form + told,
-        sha256=hashlib.sha256(data).hexdigest(),
+        sha256=_digest(data),
         lines=raw.lines,
         named=raw.named,
         **{key: value for key, value in one._asdict().items() if key != "left"},
     )
+
+
+def _digest(data: Data) -> str:
+    """SHA-256 of the bytes."""
+    digest = hashlib.sha256()
+    for piece in pieces(data, 2**24):
+        digest.update(piece)
+    return digest.hexdigest()
 
 
 FEWEST_ROWS = 8
@@ -154,6 +162,8 @@ def _part(parts: Parts, form: str, sheet: str | None, column: str | None) -> tup
     for name in parts if sheet is None else [sheet]:
         try:
             raw = parts[name]()
+        except TooMuch:
+            raise
         except DiagnosisError:
             if sheet is not None:
                 raise
@@ -171,7 +181,7 @@ def _part(parts: Parts, form: str, sheet: str | None, column: str | None) -> tup
 
 
 LARGEST = 2**30
-"""Bytes of a recording at the most: a text needs ten times its size in memory."""
+"""Bytes of a recording at the most."""
 
 PATIENCE = 2.0
 """Time [s] in which a named pipe must have something to read."""
@@ -204,9 +214,17 @@ def _bytes_of(path: Path) -> Data:
         if not select.select([pipe], [], [], PATIENCE)[0]:
             raise DiagnosisError(f"{path} is a pipe into which nothing was written for {PATIENCE:g} s")
         os.set_blocking(pipe.fileno(), True)
-        return pipe.read()
+        return _within(str(path), pipe.read(LARGEST + 1))
 
 
 def _standard_input() -> bytes:
+    if sys.stdin is None:
+        raise DiagnosisError("standard input is closed; allowed: a file, or - behind a program that writes")
     stream = getattr(sys.stdin, "buffer", None)
-    return sys.stdin.read().encode() if stream is None else stream.read()
+    return _within("standard input", sys.stdin.read().encode() if stream is None else stream.read(LARGEST + 1))
+
+
+def _within(name: str, content: bytes) -> bytes:
+    if len(content) > LARGEST:
+        raise DiagnosisError(f"{name} holds more than 1 GiB; allowed: up to 1 GiB; cut it, or one peak a cycle")
+    return content

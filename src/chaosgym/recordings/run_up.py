@@ -15,7 +15,9 @@ from typing import Any
 import numpy as np
 
 from chaosgym.arrays import Array
+from chaosgym.plain import Result, plain
 from chaosgym.recordings.cycles import CyclePeaks, cycle_peaks
+from chaosgym.recordings.fixed_lines import FixedLine
 from chaosgym.recordings.measured_sweep import FEWEST_SPEEDS, SweepTypes, judged_speed, sweep_types
 from chaosgym.recordings.orders import AngleSignal, OrderLine, OrderSpectra, ringing
 from chaosgym.recordings.sampling import Sampling
@@ -49,7 +51,7 @@ is 1 if they are independent, and 0.1 or less for a swing that takes the band.""
 
 
 @dataclass(frozen=True)
-class RunUp:
+class RunUp(Result):
     """What a recording of changing speed says.
 
     Attributes
@@ -65,6 +67,8 @@ class RunUp:
     envelope
         Strongest orders of the ringing above the highest order; empty where the signal is sampled too slowly for it, or
         nothing rings.
+    fixed
+        Fixed frequencies, upwards: hum, and resonances that noise excites.
     types
         Regions of Types I, II and III over the speed [rpm]; None where they are not told.
     judged : (2, n)
@@ -73,34 +77,31 @@ class RunUp:
         What was mended or left out, and why types are not told.
     """
 
+    shows = (
+        "missed_pulses=turns.missed doubled_pulses=turns.doubled envelope_orders=envelope fixed_frequencies=fixed types"
+    )
+
     turns: Turns
     cycles: CyclePeaks
     speeds: Array
     spectra: OrderSpectra
     lines: tuple[OrderLine, ...]
     envelope: tuple[OrderLine, ...]
+    fixed: tuple[FixedLine, ...]
     types: SweepTypes | None
     judged: Array
     notes: tuple[str, ...]
 
     def as_dict(self) -> dict[str, Any]:
         """Return plain values for JSON."""
-        rpm = 60.0 * self.spectra.speeds
-        return {
-            "turns": float(self.turns.angles[-1]),
-            "missed_pulses": self.turns.missed,
-            "doubled_pulses": self.turns.doubled,
-            "speed_rpm": {
-                "first": float(self.speeds[0]),
-                "last": float(self.speeds[-1]),
-                "smallest": float(self.speeds.min()),
-                "largest": float(self.speeds.max()),
-            },
-            "frames": {"time_s": self.spectra.times.tolist(), "speed_rpm": rpm.tolist()},
-            "orders": [{**line.as_dict(), "amplitude": line.amplitude.tolist()} for line in self.lines],
-            "envelope_orders": [line.as_dict() for line in self.envelope],
-            "types": None if self.types is None else self.types.as_dict(),
+        ends = {"first": self.speeds[0], "last": self.speeds[-1], "smallest": self.speeds.min()}
+        own = {
+            "turns": self.turns.angles[-1],
+            "speed_rpm": {**ends, "largest": self.speeds.max()},
+            "frames": {"time_s": self.spectra.times, "speed_rpm": 60.0 * self.spectra.speeds},
+            "orders": [{**line.as_dict(), "amplitude": line.amplitude} for line in self.lines],
         }
+        return {**super().as_dict(), **plain(own)}
 
 
 def run_up(
@@ -164,7 +165,7 @@ def run_up(
         notes += [] if envelope else ["no envelope: nothing rings above the highest order"]
     judged, types = np.empty((2, 0)), None
     if error is None:
-        notes.append("types by speed are not told without the sensor's error: --sensor-error or --sensor-sigma")
+        notes.append("types by speed are not told without the sensor's error: --sensor-error")
     elif float(np.ptp(speeds)) < CHANGES * float(speeds.max()):
         notes.append(f"types by speed are not told: it changes by less than {100.0 * CHANGES:g} %")
     elif cycles.resolution > NARROW * float(np.median(cycles.peaks)):
@@ -181,7 +182,10 @@ def run_up(
         else:
             types = sweep_types(judged[0], judged[1], sensor_error=sensor_error, sensor_sigma=sensor_sigma)
     lines = tuple(signal.lines(spectra))
-    return RunUp(turns, cycles, speeds, spectra, lines, tuple(envelope), types, judged, tuple(notes))
+    if not lines and types is not None and any(one.nature == "irregular" for one in types.speeds):
+        notes.append("no order stands out, so what is irregular may be noise alone")
+    fixed = tuple(signal.fixed.lines())
+    return RunUp(turns, cycles, speeds, spectra, lines, tuple(envelope), fixed, types, judged, tuple(notes))
 
 
 def _doubts(signal: AngleSignal, step: float) -> list[str]:

@@ -3,11 +3,12 @@
 ``judged_runs`` reads one file, ``judged_files`` a file, a folder or a pattern.
 """
 
-from collections.abc import Iterable
+from collections.abc import Callable, Iterable
 from dataclasses import dataclass, replace
+from functools import partial
 from glob import glob, has_magic
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -17,88 +18,16 @@ from chaosgym.numbers import summary
 from chaosgym.recordings.columns import Signal, check_peaks, choose_force, forces, named_columns
 from chaosgym.recordings.description import Sampled
 from chaosgym.recordings.judge import judge_peaks
-from chaosgym.recordings.kind import Kind, kind_of
+from chaosgym.recordings.kind import Kind, RecordingOptions, in_readings, kind_of
 from chaosgym.recordings.measured_verdict import MeasuredVerdict
 from chaosgym.recordings.read import Recording, read_recording
 
+if TYPE_CHECKING:
+    from chaosgym.recordings.cycles import CyclePeaks
+    from chaosgym.recordings.trace import Trace
 
-class InUnit(float):
-    """A size whose unit is no force.
-
-    Examples
-    --------
-    >>> from chaosgym.recordings.runs import InUnit
-    >>> InUnit(0.05, "g").unit
-    'g'
-    """
-
-    def __new__(cls, size: float | str, unit: str) -> "InUnit":
-        """Make a size in a unit."""
-        made = super().__new__(cls, size)
-        made.unit = unit
-        return made
-
-    unit: str
-
-
-@dataclass(frozen=True)
-class RecordingOptions:
-    """What is stated of a file of readings; what is not, the file or its readings tell.
-
-    Attributes
-    ----------
-    column, unit, scale
-        As for ``choose_force``; ``column`` may mean several, as for ``named_columns``.
-    sheet
-        Of a workbook; the first with the column, or with numbers.
-    kind
-        "peaks", one reading a cycle, or "series".
-    rate_hz
-        Sampling rate of a series [Hz].
-    period
-        Its cycle [s].
-    tachometer, pulses_per_revolution
-        Column of a tachometer, a turn of which is a cycle, and its pulses of a turn.
-    sensor_error, sensor_sigma
-        Largest error of a reading, or its standard deviation [N], or an ``InUnit``.
-
-    Raises
-    ------
-    DiagnosisError
-        If a tachometer stands beside a cycle, its pulses without it, or what only a series has beside ``kind="peaks"``.
-    """
-
-    column: str | None = None
-    unit: str | None = None
-    scale: str | None = None
-    sheet: str | None = None
-    kind: Kind | None = None
-    rate_hz: float | None = None
-    period: float | None = None
-    tachometer: str | None = None
-    pulses_per_revolution: int | None = None
-    sensor_error: float | None = None
-    sensor_sigma: float | None = None
-
-    def __post_init__(self) -> None:
-        """Refuse what contradicts itself."""
-        if self.tachometer and self.period is not None:
-            raise DiagnosisError("a tachometer and a cycle are stated; allowed: one of them")
-        if self.pulses_per_revolution and not self.tachometer:
-            raise DiagnosisError("pulses per revolution are stated; allowed: with a tachometer")
-        if self.kind == "peaks" and self.of_series:
-            raise DiagnosisError(
-                f"{self.of_series} is stated, which one reading a cycle has not; allowed: for a series"
-            )
-
-    @property
-    def of_series(self) -> str | None:
-        """What is stated that only a series has, in words."""
-        if self.tachometer:
-            return f"the tachometer {self.tachometer!r}"
-        if self.period is not None:
-            return f"a cycle of {self.period:.6g} s"
-        return None if self.rate_hz is None else f"a rate of {self.rate_hz:g} Hz"
+SPEED = "the speed of the machine"
+"""What tells more of a series whose cycle is estimated."""
 
 
 @dataclass(frozen=True)
@@ -121,6 +50,8 @@ class Run:
         Of the readings.
     aligned
         No cycle was left out, so that rows of several runs of a file belong together.
+    trace
+        Of a series, where it was asked for.
     """
 
     name: str
@@ -132,6 +63,7 @@ class Run:
     kind: Kind = "peaks"
     unit: str = "N"
     aligned: bool = False
+    trace: "Trace | None" = None
 
     @property
     def title(self) -> str:
@@ -153,7 +85,7 @@ class Run:
 
 @dataclass(frozen=True)
 class JudgedFile:
-    """The runs of one file with what they show together, or why it was not judged."""
+    """The runs of one file with what they show together, or why it was not judged, or some of its columns were not."""
 
     source: str
     runs: tuple[Run, ...] = ()
@@ -162,7 +94,12 @@ class JudgedFile:
 
 
 def judged_runs(
-    source: str | Path, options: RecordingOptions | None = None, *, several: bool = False, of_force: bool = False
+    source: str | Path,
+    options: RecordingOptions | None = None,
+    *,
+    several: bool = False,
+    of_force: bool = False,
+    traced: bool = False,
 ) -> tuple[Run, ...]:
     """Read and judge a file; "-" is standard input.
 
@@ -176,6 +113,8 @@ def judged_runs(
         Judge every column that could be the force, where none is named; by default there must be one.
     of_force
         Refuse readings of another quantity.
+    traced
+        Keep what is drawn of a series.
 
     Raises
     ------
@@ -184,28 +123,48 @@ def judged_runs(
 
     Examples
     --------
-    >>> from chaosgym.recordings.runs import RecordingOptions, judged_runs
+    >>> from chaosgym.recordings.kind import RecordingOptions
+    >>> from chaosgym.recordings.runs import judged_runs
     >>> (run,) = judged_runs("docs/data/peaks.csv", RecordingOptions(column="upper", sensor_error=1.0))
     >>> run.kind, len(run.peaks), run.verdict.diagnosis.nature
     ('peaks', 1000, 'undetermined')
     """
-    options = options or RecordingOptions()
+    runs, errors = _judged_columns(source, options or RecordingOptions(), several, of_force, traced)
+    if errors:
+        raise errors[0]
+    return runs
+
+
+def _judged_columns(
+    source: str | Path, options: RecordingOptions, several: bool, of_force: bool, traced: bool
+) -> tuple[tuple[Run, ...], tuple[DiagnosisError, ...]]:
+    """Read a file and judge its columns: (runs, why others of several could not be judged)."""
     recording = read_recording(source, sheet=options.sheet, column=options.column)
     names = [] if options.column is None else named_columns(recording, options.column)
     if options.tachometer is None:
         chosen = forces if several or names else lambda *of: [choose_force(*of)]
         signals = chosen(recording, options.column, options.unit, options.scale)
-        kind, why = kind_of(recording, signals[0].values, stated=options.kind, of_series=options.of_series)
+        readings = [signal.values for signal in signals]
+        kind, why = kind_of(recording, *readings, stated=options.kind, of_series=options.of_series)
     else:
         signals, (kind, why) = [], ("series", f"{options.of_series} is stated")
+    columns: list[str | None] = [*(names or [signal.name for signal in signals])] or [None]
+    judge: list[Callable[[], Run]]
     if kind == "series":
-        columns: list[str | None] = [*(names or [signal.name for signal in signals])] or [None]
-        return tuple(_of_series(recording, name, options, why, of_force) for name in columns)
-    return tuple(_of_peaks(recording, signal, options, why, of_force, len(signals) > 1) for signal in signals)
+        judge = [partial(_of_series, recording, name, options, why, of_force, traced) for name in columns]
+    else:
+        judge = [partial(_of_peaks, recording, one, options, why, of_force, len(signals) > 1) for one in signals]
+    runs, errors = [], []
+    for name, each in zip(columns, judge, strict=True):
+        try:
+            runs.append(each())
+        except DiagnosisError as error:
+            errors.append(error if len(judge) == 1 else DiagnosisError(f"column {name!r}: {error}"))
+    return tuple(runs), tuple(errors)
 
 
-def judged_run(source: str | Path, options: RecordingOptions | None = None) -> Run:
-    """Read and judge the one column of forces of a file.
+def judged_run(source: str | Path, options: RecordingOptions | None = None, *, traced: bool = False) -> Run:
+    """Read and judge the one column of forces of a file; arguments as for ``judged_runs``.
 
     Raises
     ------
@@ -213,7 +172,7 @@ def judged_run(source: str | Path, options: RecordingOptions | None = None) -> R
         As ``judged_runs``, and if several columns are named.
     """
     options = options or RecordingOptions()
-    runs = judged_runs(source, options, of_force=True)
+    runs = judged_runs(source, options, of_force=True, traced=traced)
     if len(runs) > 1:
         names = ", ".join(repr(run.name) for run in runs)
         raise DiagnosisError(f"--column {options.column!r} means {names}; allowed here: one column")
@@ -221,25 +180,31 @@ def judged_run(source: str | Path, options: RecordingOptions | None = None) -> R
 
 
 def judged_files(
-    source: str, options: RecordingOptions | None = None, *, progress: bool = False
+    source: str, options: RecordingOptions | None = None, *, progress: bool = False, traced: bool = False
 ) -> tuple[JudgedFile, ...]:
     """Read and judge a file, or those of a folder or a pattern; one of several that can't be judged says why.
+
+    ``traced`` keeps what is drawn of a series, ``progress`` shows a bar on standard error.
 
     Raises
     ------
     DiagnosisError
         If no file can be judged: what is said of the first.
     """
-    files = _files_of(source)
+    files = files_of(source)
     if files is None:
-        runs = judged_runs(source, options)
-        return (JudgedFile(runs[0].source, runs, _together(runs)),)
+        return (_judged_file(source, options or RecordingOptions(), traced),)
     if not files:
         raise DiagnosisError(f"{source} holds no file")
     from tqdm import tqdm
 
     shown = tqdm(files, desc="recordings", delay=2.0, disable=None if progress else True)
-    judged = [_judged_file(name, options) for name in shown]
+    judged = []
+    for name in shown:
+        try:
+            judged.append(_judged_file(name, options or RecordingOptions(), traced))
+        except (ChaosgymError, OSError) as error:
+            judged.append(JudgedFile(name, error=str(error)))
     if not any(one.runs for one in judged):
         raise DiagnosisError(f"no file of {source} could be judged; the first: {judged[0].error}")
     return tuple(judged)
@@ -256,20 +221,6 @@ def table_as_dict(files: Iterable[JudgedFile]) -> dict[str, Any]:
     }
 
 
-def in_readings(size: float | None, unit: str) -> float | None:
-    """The stated size of an error, which must be in the unit of the readings.
-
-    Raises
-    ------
-    DiagnosisError
-        If it is in another one.
-    """
-    stated = getattr(size, "unit", "N")
-    if size is not None and stated != unit and (stated != "N" or unit == "N"):
-        raise DiagnosisError(f"the sensor's error is in {stated}, the readings are in {unit}; state both in one unit")
-    return size
-
-
 def ask_for_force(source: str, signal: Signal) -> None:
     """Refuse readings of another quantity.
 
@@ -280,12 +231,14 @@ def ask_for_force(source: str, signal: Signal) -> None:
     """
     if signal.unit != "N":
         raise DiagnosisError(
-            f"{source}: column {signal.name!r} is in {signal.unit}, and this command asks for a force; state --scale, "
-            "such as '100 mV/N'"
+            f"{source}: column {signal.name!r} is in {signal.unit}, and this asks for a force; state "
+            f"--read scale='100 {signal.unit}/N', if it measures one"
         )
 
 
-def _of_series(recording: Recording, name: str | None, options: RecordingOptions, why: str, of_force: bool) -> Run:
+def _of_series(
+    recording: Recording, name: str | None, options: RecordingOptions, why: str, of_force: bool, traced: bool
+) -> Run:
     """One column of a series, cut into cycles, which a file of peaks does without."""
     from chaosgym.recordings.cycles import peaks_of_series
 
@@ -304,11 +257,29 @@ def _of_series(recording: Recording, name: str | None, options: RecordingOptions
         ask_for_force(recording.source, signal)
     verdict = _judged(recording.source, signal, cut.peaks, options, cut.resolution, cut.sampled)
     conditions = " and ".join(filter(None, (cut.condition, verdict.diagnosis.condition)))
-    verdict = replace(verdict, diagnosis=replace(verdict.diagnosis, condition=conditions))
+    asked = (*((SPEED,) if cut.condition else ()), *verdict.diagnosis.tells_more)
+    verdict = replace(verdict, diagnosis=replace(verdict.diagnosis, condition=conditions, tells_more=asked))
     aligned = len(cut.peaks) == len(signal.values)
+    trace = _traced(signal, cut) if traced else None
     return Run(
-        signal.name, cut.peaks, verdict, recording.source, recording.sha256, notes, "series", signal.unit, aligned
+        signal.name,
+        cut.peaks,
+        verdict,
+        recording.source,
+        recording.sha256,
+        notes,
+        "series",
+        signal.unit,
+        aligned,
+        trace,
     )
+
+
+def _traced(signal: Signal, cut: "CyclePeaks") -> "Trace":
+    """What is drawn of a series; its module is loaded only for that."""
+    from chaosgym.recordings.trace import trace_of
+
+    return trace_of(signal.values, cut)
 
 
 def _of_peaks(
@@ -346,7 +317,7 @@ def _judged(
         raise DiagnosisError(f"{where}: {error}") from error
 
 
-def _files_of(source: str) -> list[str] | None:
+def files_of(source: str) -> list[str] | None:
     """Files of a folder, or those that a pattern fits; None where one file is named."""
     if Path(source).is_dir():
         return [str(path) for path in sorted(Path(source).iterdir()) if path.is_file() and path.name[0] != "."]
@@ -355,12 +326,12 @@ def _files_of(source: str) -> list[str] | None:
     return None
 
 
-def _judged_file(source: str, options: RecordingOptions | None) -> JudgedFile:
-    try:
-        runs = judged_runs(source, options, several=True)
-    except (ChaosgymError, OSError) as error:
-        return JudgedFile(source, error=str(error))
-    return JudgedFile(source, runs, _together(runs))
+def _judged_file(source: str, options: RecordingOptions, traced: bool) -> JudgedFile:
+    """Judge every column of a file that could be the force; where some can't be judged, say why."""
+    runs, errors = _judged_columns(source, options, several=True, of_force=False, traced=traced)
+    if not runs:
+        raise errors[0]
+    return JudgedFile(runs[0].source, runs, _together(runs), "; ".join(map(str, errors)))
 
 
 def _together(runs: tuple[Run, ...]) -> MeasuredVerdict | None:

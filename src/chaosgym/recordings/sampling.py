@@ -1,6 +1,5 @@
 """Instants of the samples of a recording: from a rate, or from stamps without their rounding, with gaps."""
 
-import math
 import re
 from typing import NamedTuple
 
@@ -8,7 +7,8 @@ import numpy as np
 
 from chaosgym.arrays import Array
 from chaosgym.errors import DiagnosisError
-from chaosgym.recordings.columns import Signal, is_clock, is_counter, rises
+from chaosgym.numbers import number
+from chaosgym.recordings.columns import BLOCK, Signal, is_clock, is_counter, rises, steps_of
 from chaosgym.recordings.quantities import CLOCK, TIMES
 from chaosgym.recordings.read import Recording
 from chaosgym.units import duration
@@ -18,6 +18,12 @@ LONGEST_GAP, UNEVEN = 1.5, 0.2
 
 EPOCHS = {1e9: 1.0, 1e12: 1e-3, 1e15: 1e-6, 1e18: 1e-9}
 """Seconds in a unit of the clocks that count from 1970, by the smallest of their readings: those of September 2001."""
+
+DAYS = {"1899": (36_000.0, 80_000.0), "the year 0": (700_000.0, 800_000.0)}
+"""Days by which spreadsheets and MATLAB count instants: since when, and the least and largest of this century."""
+
+SHORT_OF_A_DAY = 1e-6
+"""Step of such stamps, 0.09 s, below which they count days: as seconds they would be sampled at more than 1 MHz."""
 
 AGREE, SLOW = 0.02, 0.1
 """Relative deviation of two sampling rates that are the same, and the step [s] from which stamps need a unit."""
@@ -87,7 +93,7 @@ def sampling(recording: Recording, size: int, rate_hz: float | None = None, colu
     size
         Number of samples.
     rate_hz
-        Sampling rate [Hz], if it is known.
+        Sampling rate [Hz], if it is known. It counts before what the file says; where that differs, ``origin`` says so.
     column
         That was sampled; its own rate counts before those of the file.
 
@@ -98,7 +104,7 @@ def sampling(recording: Recording, size: int, rate_hz: float | None = None, colu
         rounding, or their unit can't be told.
     """
     if rate_hz is not None:
-        return _at(rate_hz, size, "as stated")
+        return _at(rate_hz, size, f"as stated{_instead_of(recording, size, rate_hz, column)}")
     own = recording.rates.get(column or "")
     rates = dict(recording.rates) if column is None or own is None else {column: own}
     stamps = choose_time(recording, told=bool(rates), rate_hz=recording.rate_hz)
@@ -107,18 +113,26 @@ def sampling(recording: Recording, size: int, rate_hz: float | None = None, colu
         return even._replace(origin=f"by {stamps.described}{even.origin}")
     if not rates:
         raise DiagnosisError(
-            f"{recording.source} has no time column; use --rate-hz, or name the time column 'time [s]'"
+            f"{recording.source} has no time column; use --read rate-hz=..., or name the time column 'time [s]'"
         )
     key, rate = next(iter(rates.items()))
     if not np.allclose(list(rates.values()), rate, rtol=1e-6, atol=0.0):
         listed = ", ".join(f"{key} = {rate:.6g} Hz" for key, rate in rates.items())
-        raise DiagnosisError(f"{recording.source} states several rates: {listed}; use --rate-hz")
+        raise DiagnosisError(f"{recording.source} states several rates: {listed}; use --read rate-hz=...")
     return _at(rate, size, "by the channel" if key in recording.columns else f"by {key!r}")
 
 
+def _instead_of(recording: Recording, size: int, rate_hz: float, column: str | None) -> str:
+    """What the file says by itself, where it contradicts a stated rate; empty where it agrees or can't be used."""
+    try:
+        own = sampling(recording, size, None, column)
+    except DiagnosisError:
+        return ""
+    return "" if abs(own.step * rate_hz - 1.0) < AGREE else f", instead of {1.0 / own.step:.6g} Hz {own.origin}"
+
+
 def _at(rate: float, size: int, origin: str) -> Sampling:
-    if not (math.isfinite(rate) and rate > 0.0):
-        raise DiagnosisError(f"rate = {rate:g} Hz is out of range; allowed: above 0")
+    number("rate", rate, 0.0, unit="Hz", inside=True, error=DiagnosisError)
     return Sampling(Even(0.0, 1.0 / rate, size), 1.0 / rate, (), origin)
 
 
@@ -139,12 +153,13 @@ def choose_time(recording: Recording, *, told: bool = False, rate_hz: float | No
     if name in recording.problems or name in recording.doubts:
         reason = recording.problems.get(name) or f"column {name!r} {recording.doubts[name]}"
         raise DiagnosisError(f"{recording.source}, {reason}")
-    values, unit = recording.columns[name].astype(float), recording.units.get(name, "")
+    values, unit = np.asarray(recording.columns[name], dtype=float), recording.units.get(name, "")
     if unit and unit in TIMES:
-        values, shown = values * TIMES[unit], f"column {name!r} [{unit}]"
+        values, shown = values if TIMES[unit] == 1.0 else values * TIMES[unit], f"column {name!r} [{unit}]"
     else:
         size, how = _size(recording, name, rate_hz)
-        values, shown = (values - values[0]) * size, f"column {name!r} [{how}]"
+        values, shown = values - values[0], f"column {name!r} [{how}]"
+        values *= size
     if (fraction := _milliseconds(recording, name, values)) is not None:
         values, shown = values + 1e-3 * recording.columns[fraction], f"{shown} and {fraction!r} [ms]"
     return Signal(values, name, shown, "s")
@@ -156,6 +171,9 @@ def _clock(recording: Recording, told: bool) -> str | None:
     fits = [name for name in columns if units.get(name, "") in TIMES]
     named = [name for name in columns if any(map(CLOCK.fullmatch, re.split(r"[\W_\d]+", name)))]
     rising = [name for name in [*fits, *named] if rises(columns[name])]
+    rising.sort(
+        key=lambda name: len(columns[name]) > 1 and columns[name][-1] == columns[name][0]
+    )  # one that stands is none
     if not rising and len(columns) > 1 and not told:
         rising = [
             name for name in columns if is_clock(columns[name]) and not units.get(name) and not _counts(columns[name])
@@ -176,8 +194,8 @@ def _size(recording: Recording, name: str, rate_hz: float | None) -> tuple[float
     DiagnosisError
         If they contradict the stated rate, or step so far that they may count parts of a second.
     """
-    values = recording.columns[name].astype(float)
-    step, typical = float(values[-1] - values[0]) / max(1, len(values) - 1), float(np.median(np.diff(values)))
+    values = np.asarray(recording.columns[name], dtype=float)
+    step, typical = float(values[-1] - values[0]) / max(1, len(values) - 1), typical_step(values)
     if rate_hz is not None:
         for unit in ("s", "ms", "us", "ns"):
             if min(abs(each * TIMES[unit] * rate_hz - 1.0) for each in (step, typical)) < AGREE:
@@ -185,15 +203,18 @@ def _size(recording: Recording, name: str, rate_hz: float | None) -> tuple[float
     for least, size in EPOCHS.items():
         if least <= values[0] and values[-1] < 3.0 * least and typical * size < 2.0:
             return size, f"{duration(size).removeprefix('1 ')} since 1970"
+    for first_day, (low, high) in DAYS.items():
+        if low <= values[0] and values[-1] < high and typical < SHORT_OF_A_DAY:
+            return 86400.0, f"days since {first_day}"
     if rate_hz is not None:
         raise DiagnosisError(
             f"{recording.source}: column {name!r} rises in steps of {typical:.6g} without a unit, and the file states "
-            f"{rate_hz:.6g} Hz; use --rate-hz"
+            f"{rate_hz:.6g} Hz; use --read rate-hz=..."
         )
     if typical >= SLOW * (1.0 - 1e-9):
         raise DiagnosisError(
             f"{recording.source}: column {name!r} rises in steps of {typical:.6g} without a unit; name it "
-            f"'{name} [ms]' or '{name} [s]', or use --rate-hz, {1e3 / typical:.6g} if these are milliseconds"
+            f"'{name} [ms]' or '{name} [s]', or use --read rate-hz={1e3 / typical:.6g} if these are milliseconds"
         )
     return 1.0, "no unit, taken as s"
 
@@ -220,32 +241,56 @@ def even_sampling(stamps: Array, recording: Recording) -> Sampling:
     DiagnosisError
         If the stamps fall, or their steps differ by more than rounding; names the line.
     """
-    steps = np.diff(stamps)
-    falling = np.flatnonzero(~(steps >= 0.0))
-    if len(steps) < 2 or len(falling):
-        where = recording.where(int(falling[0]) + 1) if len(falling) else recording.where(0)
-        raise DiagnosisError(f"{recording.source}, {where}: time does not rise; allowed: one series in increasing time")
-    changes = np.flatnonzero(steps > 0.0) + 1
-    if np.count_nonzero(steps > 0.0) < len(steps) / 3:
-        return _within_stamps(stamps, changes.tolist(), recording)
-    rounding = _rounding(stamps)
-    typical = float(np.median(steps))
-    typical = float(np.mean(steps[steps <= LONGEST_GAP * typical + 2.0 * rounding]))
-    gap = steps > LONGEST_GAP * typical + 1.01 * rounding
-    odd = np.flatnonzero((np.abs(steps - typical) > UNEVEN * typical + 1.01 * rounding) & ~gap)
-    if len(odd) or gap.mean() > 0.1:
-        first = int(odd[0] if len(odd) else np.flatnonzero(gap)[0])
-        raise DiagnosisError(
-            f"{recording.source}, {recording.where(first + 1)}: sampled unevenly, a step of {duration(steps[first])} "
-            f"where {duration(typical)} are usual; resample at equal steps"
-        )
-    counted = np.where(gap, np.round(steps / typical), 1.0)
-    order = np.concatenate([[0.0], np.cumsum(counted)])
-    step = float((stamps[-1] - stamps[0]) / order[-1])
+    size, rises = len(stamps), 0
+    for first, steps in zip(range(0, size, BLOCK), steps_of(stamps), strict=False):
+        falling = np.flatnonzero(~(steps >= 0.0))
+        if size < 3 or len(falling):
+            where = recording.where(first + int(falling[0]) + 1) if len(falling) else recording.where(0)
+            raise DiagnosisError(
+                f"{recording.source}, {where}: time does not rise; allowed: one series in increasing time"
+            )
+        rises += int(np.count_nonzero(steps > 0.0))
+    if rises < (size - 1) / 3:
+        return _within_stamps(stamps, (np.flatnonzero(np.diff(stamps) > 0.0) + 1).tolist(), recording)
+    return _without_rounding(stamps, recording)
+
+
+def _without_rounding(stamps: Array, recording: Recording) -> Sampling:
+    """Instants in equal steps but for gaps; block by block."""
+    rounding, typical = _rounding(stamps), typical_step(stamps)
+    longest = LONGEST_GAP * typical + 2.0 * rounding
+    usual = [steps[steps <= longest] for steps in steps_of(stamps[: BLOCK + 1])]
+    typical = float(np.mean(np.concatenate(usual)))
+    gaps: list[int] = []
+    for first, steps in zip(range(0, len(stamps), BLOCK), steps_of(stamps), strict=False):
+        gap = steps > LONGEST_GAP * typical + 1.01 * rounding
+        odd = np.flatnonzero((np.abs(steps - typical) > UNEVEN * typical + 1.01 * rounding) & ~gap)
+        gaps += (first + np.flatnonzero(gap)).tolist()
+        if len(odd) or len(gaps) > 0.1 * (len(stamps) - 1):
+            place = first + int(odd[0]) if len(odd) else gaps[0]
+            raise DiagnosisError(
+                f"{recording.source}, {recording.where(place + 1)}: sampled unevenly, a step of "
+                f"{duration(float(stamps[place + 1] - stamps[place]))} where {duration(typical)} are usual; resample "
+                "at equal steps"
+            )
+    lost = [round(float(stamps[place + 1] - stamps[place]) / typical) - 1 for place in gaps]
+    step = float((stamps[-1] - stamps[0]) / (len(stamps) - 1 + sum(lost)))
+    if not gaps:
+        return Sampling(Even(float(stamps[0]), step, len(stamps)), step, ())
+    order = np.ones(len(stamps))
+    order[0], order[np.array(gaps) + 1] = 0.0, np.array(lost) + 1.0
+    np.cumsum(order, out=order)
     told = tuple(
-        f"{recording.where(int(place) + 1)}: a gap of {duration(steps[place])}" for place in np.flatnonzero(gap)[:5]
+        f"{recording.where(place + 1)}: a gap of {duration(float(stamps[place + 1] - stamps[place]))}"
+        for place in gaps[:5]
     )
     return Sampling(stamps[0] + order * step, step, told)
+
+
+def typical_step(stamps: Array) -> float:
+    """Median step of stamps, of a long column by every so many of them."""
+    every = -(-len(stamps) // BLOCK)
+    return float(np.median(stamps[1::every] - stamps[:-1:every]))
 
 
 def _within_stamps(stamps: Array, changes: list[int], recording: Recording) -> Sampling:
@@ -257,7 +302,9 @@ def _within_stamps(stamps: Array, changes: list[int], recording: Recording) -> S
         If fewer than three stamps are whole, or these hold unlike numbers of samples.
     """
     if len(changes) < 4:
-        raise DiagnosisError(f"{recording.source}: the time stamps are too coarse to tell samples apart; use --rate-hz")
+        raise DiagnosisError(
+            f"{recording.source}: the time stamps are too coarse to tell samples apart; use --read rate-hz=..."
+        )
     counts, spans = np.diff(changes), np.diff(stamps[changes])
     step = float(spans.sum() / counts.sum())
     odd = np.flatnonzero(np.abs(counts - spans / step) > 1.0 + UNEVEN * spans / step)
@@ -266,7 +313,7 @@ def _within_stamps(stamps: Array, changes: list[int], recording: Recording) -> S
         raise DiagnosisError(
             f"{recording.source}, {recording.where(changes[place])}: {counts[place]} samples within "
             f"{duration(spans[place])}, where {spans[place] / step:.4g} are usual; resample at equal steps, or use "
-            "--rate-hz"
+            "--read rate-hz=..."
         )
     first = float(stamps[changes[0]]) - step * changes[0]
     origin = f", whose stamps of {duration(float(np.median(spans)))} hold {np.median(counts):.6g} samples each"
@@ -276,6 +323,8 @@ def _within_stamps(stamps: Array, changes: list[int], recording: Recording) -> S
 def _rounding(stamps: Array) -> float:
     """Last decimal place of the stamps [s]; 0 if they have more than twelve."""
     for decimals in range(13):
-        if np.max(np.abs(np.round(stamps, decimals) - stamps)) <= 1e-9 * 10.0**-decimals + 4e-16 * abs(stamps[-1]):
+        most = 1e-9 * 10.0**-decimals + 4e-16 * abs(stamps[-1])
+        blocks = (stamps[first : first + BLOCK] for first in range(0, len(stamps), BLOCK))
+        if all(np.max(np.abs(np.round(block, decimals) - block)) <= most for block in blocks):
             return float(10.0**-decimals)
     return 0.0

@@ -11,11 +11,13 @@ from dataclasses import replace
 import numpy as np
 
 from chaosgym.arrays import Array
+from chaosgym.recordings.chaos import chaotic, is_chaotic
+from chaosgym.recordings.few_lines import slipped_torus
 from chaosgym.recordings.measured_verdict import MeasuredVerdict
-from chaosgym.recordings.scatter import Scatter, chaotic, is_chaotic, scatter_of
+from chaosgym.recordings.scatter import Scatter, scatter_of
 from chaosgym.series.determinism import determinism
 from chaosgym.series.noise import quantum, repair
-from chaosgym.series.two_step import CHAOTIC_CYCLES
+from chaosgym.series.transient_chaos import CHAOTIC_CYCLES
 from chaosgym.series.verdict import undetermined
 
 UNSTEADY = "not a steady response"
@@ -79,7 +81,7 @@ def _asked_together(alone: Sequence[MeasuredVerdict], peaks: Array, names: Seque
         first = alone[0].diagnosis
         return _open(f"no sensor decides: {first.reason}", peaks, alone, first.tells_more)
     fitted = determinism(np.column_stack([found.readings for found in several]))
-    if not is_chaotic(several, fitted):
+    if not is_chaotic(several, fitted) or any(slipped_torus(found, None) for found in several):
         reason = f"{' and '.join(names)} together: random or chaotic, these sensors cannot tell"
         return _open(reason, peaks, alone, ("more cycles", "another speed", "the machine's model"))
     found = chaotic(several, fitted, None, [names[place] for place in fitted.order])

@@ -9,8 +9,9 @@ import numpy as np
 
 from chaosgym.errors import DiagnosisError
 from chaosgym.recordings.columns import calibration
+from chaosgym.recordings.heading import COMMENT, QUOTED, TORN
+from chaosgym.recordings.lines import NUMBER
 from chaosgym.recordings.quantities import FORCES, as_unit, split_unit
-from chaosgym.recordings.text import COMMENT, NUMBER, QUOTED, TORN
 
 AMBIGUOUS = re.compile(r"[+-]?\d{1,3},\d{3}")
 """1.1, or the columns 1 and 100, or eleven hundred."""
@@ -51,7 +52,8 @@ class LineReader:
             factor, target = FORCES.get(as_unit(written) or written or "N", 0.0), "N"
         if target != "N" or not factor:
             raise DiagnosisError(
-                f"the monitor asks for forces; allowed: --unit {', '.join(FORCES)}, or --scale '100 mV/N'"
+                "the monitor asks for forces; allowed: --read scale='100 mV/N', or --read unit=UNIT of "
+                f"{', '.join(FORCES)}"
             )
         return factor
 

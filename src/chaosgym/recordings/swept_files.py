@@ -1,6 +1,7 @@
 """A recording at many speeds, or one whose speed changes: its file, and the types that it shows."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
+from hashlib import sha256
 from pathlib import Path
 from typing import Any
 
@@ -8,16 +9,18 @@ import numpy as np
 
 from chaosgym.arrays import Array
 from chaosgym.errors import DiagnosisError
+from chaosgym.plain import Result, plain
 from chaosgym.recordings.columns import Signal, check_peaks, choose_force, choose_speed
 from chaosgym.recordings.cycles import series_of
+from chaosgym.recordings.kind import RecordingOptions, in_readings
 from chaosgym.recordings.measured_sweep import SweepTypes, sweep_types
 from chaosgym.recordings.read import Recording, read_recording
 from chaosgym.recordings.run_up import HIGHEST_ORDER, RunUp, run_up
-from chaosgym.recordings.runs import RecordingOptions, ask_for_force, in_readings
+from chaosgym.recordings.runs import ask_for_force, files_of
 
 
 @dataclass(frozen=True)
-class JudgedSweep:
+class JudgedSweep(Result):
     """Peaks at many speeds, from a file.
 
     Attributes
@@ -29,6 +32,11 @@ class JudgedSweep:
     types
         Regions of Types I, II and III.
     """
+
+    shows = (
+        "file=recording.source sha256=recording.sha256 speed_column=speed.name speed_unit=speed.unit "
+        "column=force.name notes"
+    )
 
     recording: Recording
     speed: Signal
@@ -49,15 +57,7 @@ class JudgedSweep:
 
     def as_dict(self) -> dict[str, Any]:
         """Return plain values for JSON."""
-        return {
-            "file": self.recording.source,
-            "sha256": self.recording.sha256,
-            "speed_column": self.speed.name,
-            "speed_unit": self.speed.unit,
-            "column": self.force.name,
-            "notes": self.notes,
-            **self.types.as_dict(),
-        }
+        return {**super().as_dict(), **plain(self.types)}
 
 
 def judged_sweep(
@@ -68,7 +68,7 @@ def judged_sweep(
     Parameters
     ----------
     source
-        Name of the file; "-" is standard input.
+        Name of the file; "-" is standard input. Readings of a folder or a pattern of files count as those of one file.
     options
         What is stated of it: its column of forces, and the sensor's error, which is needed.
     speed_column
@@ -81,13 +81,40 @@ def judged_sweep(
 
     Examples
     --------
-    >>> from chaosgym.recordings.runs import RecordingOptions
+    >>> from chaosgym.recordings.kind import RecordingOptions
     >>> from chaosgym.recordings.swept_files import judged_sweep
     >>> sweep = judged_sweep("docs/data/sweep.csv", RecordingOptions(sensor_error=3.0))
     >>> [(region.type, region.first, region.last) for region in sweep.types.regions]
     [('I', 4.0, 7.0), ('II', 8.0, 21.0), ('III', 22.0, 30.0)]
     """
     options = options or RecordingOptions()
+    files = files_of(str(source))
+    if files == []:
+        raise DiagnosisError(f"{source} holds no file")
+    parts = [_columns(name, options, speed_column) for name in files or [str(source)]]
+    recording, speed, force, *_ = parts[0]
+    for other, beside, *_ in parts[1:]:
+        if beside.unit != speed.unit:
+            raise DiagnosisError(
+                f"{other.source} has speeds in {beside.unit or 'no unit'}, {recording.source} in "
+                f"{speed.unit or 'no unit'}; allowed: one unit"
+            )
+    if files is not None:
+        digest = sha256("".join(part[0].sha256 for part in parts).encode()).hexdigest()
+        recording = replace(recording, source=str(source), sha256=digest)
+        force = force._replace(described=f"{force.described}; of {len(parts)} files")
+    speeds, peaks = (np.concatenate([part[place] for part in parts]) for place in (3, 4))
+    try:
+        types = sweep_types(speeds, peaks, sensor_error=options.sensor_error, sensor_sigma=options.sensor_sigma)
+    except DiagnosisError as error:
+        raise DiagnosisError(f"{recording.source}: {error}") from error
+    return JudgedSweep(recording, speed, force, speeds, peaks, types)
+
+
+def _columns(
+    source: str, options: RecordingOptions, speed_column: str | None
+) -> tuple[Recording, Signal, Signal, Array, Array]:
+    """A file, its columns of speed and force, and what is there of both."""
     recording = read_recording(source, sheet=options.sheet, column=options.column)
     speed = choose_speed(recording, speed_column)
     force = choose_force(recording, options.column, options.unit, options.scale)
@@ -102,15 +129,11 @@ def judged_sweep(
         )
     there = np.isfinite(speed.values) & np.isfinite(force.values)
     speeds, peaks = speed.values[there], check_peaks(force._replace(values=force.values[there]), recording)
-    try:
-        types = sweep_types(speeds, peaks, sensor_error=options.sensor_error, sensor_sigma=options.sensor_sigma)
-    except DiagnosisError as error:
-        raise DiagnosisError(f"{recording.source}: {error}") from error
-    return JudgedSweep(recording, speed, force, speeds, peaks, types)
+    return recording, speed, force, speeds, peaks
 
 
 @dataclass(frozen=True)
-class JudgedRunUp:
+class JudgedRunUp(Result):
     """A recording of changing speed, from a file.
 
     Attributes
@@ -120,6 +143,8 @@ class JudgedRunUp:
     result
         Orders and types.
     """
+
+    shows = "file=recording.source sha256=recording.sha256 column=signal.name unit=signal.unit notes"
 
     recording: Recording
     signal: Signal
@@ -132,14 +157,7 @@ class JudgedRunUp:
 
     def as_dict(self) -> dict[str, Any]:
         """Return plain values for JSON."""
-        return {
-            "file": self.recording.source,
-            "sha256": self.recording.sha256,
-            "column": self.signal.name,
-            "unit": self.signal.unit,
-            **self.result.as_dict(),
-            "notes": self.notes,
-        }
+        return {**super().as_dict(), **self.result.as_dict()}
 
 
 def judged_run_up(source: str | Path, options: RecordingOptions, *, highest: float = HIGHEST_ORDER) -> JudgedRunUp:

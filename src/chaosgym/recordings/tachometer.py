@@ -24,11 +24,14 @@ NARROW, FLAGS = 1.5, 10.0
 """Samples that a pulse must last, or some fall between samples; and from pulse to pulse where one will do, which a
 logger set."""
 
-WINDOW = 11
-"""Intervals of pulses whose median is the usual one."""
+WINDOW, TREND = 11, 3
+"""Intervals of pulses whose median is the usual one, and degree of the trend of the speed that is taken out before."""
 
 SHORT, UNEVEN = 0.6, 0.3
 """Shares of the usual interval: below which a pulse is doubled, and by which intervals may miss whole numbers of it."""
+
+STRAY = 0.15
+"""Share of the usual interval by which a pulse lies beside its place on both sides, where it is none of the shaft's."""
 
 MOST_MENDED, MOST_UNEVEN = 0.2, 0.05
 """Shares of the pulses that may be missed or doubled, and of the intervals that may be uneven."""
@@ -126,7 +129,7 @@ def turns_of(signal: Array, time: Array, pulses_per_revolution: int = 1) -> Turn
             f"{FEWEST_SAMPLES}, and {NARROW:g}; sample faster, or use fewer pulses per revolution"
         )
     rises = _fast_enough(rises)
-    single = _without_doubled(rises)
+    single = _without_stray(_without_doubled(rises))
     numbers, missed = _numbered(single)
     doubled = len(rises) - len(single)
     if missed + doubled > MOST_MENDED * len(rises):
@@ -191,9 +194,13 @@ def _fast_enough(rises: Array) -> Array:
 
 
 def _usual(gaps: Array) -> Array:
+    """The interval of one pulse at each of the intervals, of which some span several; a trend of the speed is kept."""
     from scipy.ndimage import median_filter
 
-    return np.asarray(median_filter(gaps, WINDOW, mode="nearest"))
+    logs, number = np.log(gaps), np.arange(len(gaps))
+    middle = median_filter(logs, WINDOW, mode="mirror")
+    trend = np.polynomial.Polynomial.fit(number, middle, min(TREND, len(gaps) - 1))(number)
+    return np.asarray(np.exp(trend + median_filter(logs - trend, WINDOW, mode="mirror")))
 
 
 def _without_doubled(rises: Array) -> Array:
@@ -209,6 +216,24 @@ def _without_doubled(rises: Array) -> Array:
         first = place - max(0, place - 1)
         costs = [float(np.abs(np.diff(np.delete(around, first + k)) - usual[place]).sum()) for k in (0, 1)]
         rises = np.delete(rises, place + int(np.argmin(costs)))
+    return rises
+
+
+def _without_stray(rises: Array) -> Array:
+    """Pulses without those that stand where one beside them was missed: apart by no whole intervals, on both sides."""
+    while len(rises) > WINDOW:
+        share = np.diff(rises) / _usual(np.diff(rises))
+        away = share - np.maximum(1.0, np.rint(share))
+        both = share[:-1] + share[1:]
+        whole = np.abs(both - np.rint(both)) < 0.5 * STRAY
+        stray = np.flatnonzero((np.minimum(np.abs(away[:-1]), np.abs(away[1:])) > STRAY) & whole) + 1
+        if not len(stray):
+            break
+        worst = int(stray[np.argmax(np.abs(away[stray]))])
+        rises = np.delete(rises, worst)
+    for end in (0, -1):  # beside the first pulse and the last one it makes the interval short
+        while len(rises) > WINDOW and np.diff(rises)[end] < (1.0 - 2.0 * STRAY) * _usual(np.diff(rises))[end]:
+            rises = np.delete(rises, end)
     return rises
 
 

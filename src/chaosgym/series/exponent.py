@@ -9,13 +9,13 @@ M. T. Rosenstein, J. J. Collins, C. J. De Luca, Physica D 65 (1993) 117-134.
 """
 
 from dataclasses import dataclass, field
-from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike
 
 from chaosgym.arrays import Array
 from chaosgym.errors import DiagnosisError
+from chaosgym.plain import Result
 from chaosgym.series.stroboscopic import as_samples
 
 ROUND_OFF = 1e-12
@@ -29,7 +29,7 @@ BLOCKS = 20
 
 
 @dataclass(frozen=True, kw_only=True)
-class LyapunovExponent:
+class LyapunovExponent(Result):
     """A largest Lyapunov exponent with its uncertainty.
 
     Attributes
@@ -47,6 +47,8 @@ class LyapunovExponent:
     round_off
         Value that rounding alone may give.
     """
+
+    shows = "value=per_cycle standard_error per_second cycles history"
 
     per_cycle: float
     standard_error: float
@@ -70,15 +72,10 @@ class LyapunovExponent:
         grows = self.per_cycle * self.cycles > POLYNOMIAL
         return int(np.sign(self.per_cycle)) if certain and (grows or self.per_cycle < 0.0) else 0
 
-    def as_dict(self) -> dict[str, Any]:
-        """Return plain values for JSON."""
-        return {
-            "value": self.per_cycle,
-            "standard_error": self.standard_error,
-            "per_second": self.per_second,
-            "cycles": self.cycles,
-            "history": list(self.history),
-        }
+
+def chaos_margin(per_cycle: float, standard_error: float) -> float:
+    """Distance of an exponent from three standard errors above zero: 0 there, 1 from six on."""
+    return float(np.clip(per_cycle / (3.0 * standard_error) - 1.0, 0.0, 1.0))
 
 
 def average_growth(log_growth: ArrayLike, cycle_period: float = 1.0, round_off: float = ROUND_OFF) -> LyapunovExponent:

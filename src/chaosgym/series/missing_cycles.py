@@ -18,6 +18,11 @@ FAR, PRICE = 6.0, 20.0
 MOST_LOST = 0.1
 """Share of the readings before which cycles may be missing."""
 
+LEAST_DRIFT, STEADY, LONG = 4, 0.45, 8
+"""Cycles by which the phase of a pattern drifts in all, standard deviation [cycles] from a steady drift, and period
+from which it may (assumed). Of a staircase the deviation is 0.3; of losses by chance it grows with their number. Losses
+of some recorders come at equal intervals; a short pattern shows them, since each of its readings is another."""
+
 
 def with_stand_ins(values: Array, period: int, scatter: float) -> tuple[Array, NDArray[np.int64]]:
     """(record with stand-ins for missing cycles, which reading each is, -1 for a stand-in).
@@ -42,7 +47,7 @@ def with_stand_ins(values: Array, period: int, scatter: float) -> tuple[Array, N
         return values, origin
     phase = _phases(values, pattern, scatter)
     lost = (np.diff(phase) - 1) % period
-    if np.count_nonzero(lost) > MOST_LOST * len(values):
+    if np.count_nonzero(lost) > MOST_LOST * len(values) or _beats(lost, period):
         return values, origin
     place = np.concatenate([[0], np.cumsum(1 + lost)])
     whole, origin = np.full(place[-1] + 1, np.nan), np.full(place[-1] + 1, -1)
@@ -50,6 +55,15 @@ def with_stand_ins(values: Array, period: int, scatter: float) -> tuple[Array, N
     for gap in np.flatnonzero(origin < 0):
         whole[gap] = whole[gap - period] if gap >= period else pattern[(phase[0] + gap) % period]
     return whole, origin
+
+
+def _beats(lost: NDArray[np.int64], period: int) -> bool:
+    """Whether the phase of a pattern drifts steadily: its period is no whole number of cycles, and nothing is lost."""
+    if period < LONG:
+        return False
+    drift, cycles = np.cumsum((lost + period // 2) % period - period // 2), np.arange(len(lost))
+    steady = np.polynomial.Polynomial.fit(cycles, drift, 1)
+    return bool(abs(drift[-1]) >= LEAST_DRIFT and np.std(drift - steady(cycles)) < STEADY)
 
 
 def _pattern(values: Array, period: int, far: NDArray[np.bool_]) -> Array | None:

@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 
 from chaosgym.arrays import Array
 from chaosgym.errors import DiagnosisError
+from chaosgym.numbers import number
 from chaosgym.series.missing_cycles import with_stand_ins
 
 LONGEST_PERIOD = 64
@@ -61,10 +62,10 @@ def stated_error(half_width: float | None, sigma: float | None) -> SensorError |
         If both are given, or one is negative or not finite.
     """
     if half_width is not None and sigma is not None:
-        raise DiagnosisError("the sensor's error is given twice; allowed: --sensor-error or --sensor-sigma")
+        raise DiagnosisError("the sensor's error is given twice; allowed: sensor_error or sensor_sigma")
     for name, value in (("error", half_width), ("sigma", sigma)):
-        if value is not None and not (math.isfinite(value) and value >= 0.0):
-            raise DiagnosisError(f"sensor {name} = {value:g} N is out of range; allowed: finite, 0 or more")
+        if value is not None:
+            number(f"sensor {name}", value, 0.0, unit="N", error=DiagnosisError)
     if half_width is not None:
         return SensorError(half_width, half_width / math.sqrt(3.0), "stated")
     return None if sigma is None else SensorError(3.0 * sigma, sigma, "stated sigma")

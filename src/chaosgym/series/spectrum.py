@@ -44,7 +44,7 @@ class Spectrum:
 
 def _window(n: int) -> Array:
     angle = 2.0 * np.pi * np.arange(n) / n
-    return np.asarray(sum(c * np.cos(i * angle) for i, c in enumerate(_COEFFICIENTS)))
+    return np.asarray(sum(c * np.exp(1j * i * angle).real for i, c in enumerate(_COEFFICIENTS)))
 
 
 def power_spectrum(series: Array, noise_variance: float = 0.0) -> Spectrum:
@@ -100,11 +100,11 @@ def without_lines(values: Array, most: int, enough: float) -> tuple[Array, int]:
         power[: 2 * PADDED] = 0.0
         frequencies = np.asarray([*frequencies, float(np.argmax(power)) / (PADDED * size)])
         for _ in range(STEPS):
-            frequencies, rest = _fitted(values, time, frequencies)
+            frequencies, rest = fitted(values, time, frequencies)
     return rest, len(frequencies)
 
 
-def _fitted(values: Array, time: NDArray[Any], frequencies: Array) -> tuple[Array, Array]:
+def fitted(values: Array, time: NDArray[Any], frequencies: Array) -> tuple[Array, Array]:
     """One Gauss-Newton step on the frequencies [1/cycle], and the rest before it."""
     angle = 2.0 * np.pi * np.outer(time, frequencies)
     cosine, sine = np.cos(angle), np.sin(angle)

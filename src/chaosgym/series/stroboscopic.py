@@ -7,6 +7,7 @@ small misses add up. Values count from a physical zero (mid gap, no force), and 
 A slow approach to a periodic motion does not repeat yet, but its distances |x(n + k) - x(n)| shrink steadily.
 """
 
+import math
 from dataclasses import dataclass
 
 import numpy as np
@@ -181,10 +182,10 @@ def _true_period(tail: Array, period: int) -> int:
     return decay.period if decay is not None and decay.factor >= DECAY_FACTOR and period % decay.period == 0 else period
 
 
-def deviations(samples: Array, period: int) -> Array:
-    """Largest distance of each sample from the mean of its class in the last half, (cycles,)."""
+def deviations(samples: Array, period: int, repeats: int | None = None) -> Array:
+    """Largest distance of each sample from the mean of its class in the last half, or last ``repeats``, (cycles,)."""
     n = len(samples)
-    repeats = max(1, (n - n // 2) // period)
+    repeats = repeats or max(1, (n - n // 2) // period)
     reference = samples[n - repeats * period :].reshape(repeats, period, -1).mean(axis=0)
     phase = (np.arange(n) - (n - repeats * period)) % period
     return np.asarray(np.max(np.abs(samples - reference[phase]), axis=1))
@@ -196,8 +197,10 @@ def _contraction(deviation: Array, settle: int, period: int) -> float | None:
     stretch = deviation[start:settle]
     if len(stretch) < 5 or np.any(stretch <= 0.0):
         return None
-    slope = np.polyfit(np.arange(len(stretch)), np.log(stretch), 1)[0]
-    return float(np.exp(slope))
+    # sums in a fixed order: a library of linear algebra has another one on each processor
+    time = np.arange(len(stretch)) - 0.5 * (len(stretch) - 1)
+    slope = sum(t * math.log(size) for t, size in zip(time.tolist(), stretch.tolist(), strict=True))
+    return math.exp(slope / float(np.sum(time**2)))
 
 
 @dataclass(frozen=True)

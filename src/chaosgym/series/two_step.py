@@ -6,10 +6,11 @@ Step II  If not: the stroboscopic set and the spectrum. A closed curve gives a f
          quasiperiodic. A fractal or fuzzy set gives a broad band and diffusing walks: chaotic, unless the set itself is
          a closed curve.
 
-Chaos that dies out counts as chaotic, as in the thesis (5.2.3), and is flagged ``transient``. Where the figures of
-step II disagree, or the record is too short for the verdict, the answer is "undetermined".
+The nature is that of the settled motion; chaos that died out before is counted in ``transient_chaos``. Where the
+figures of step II disagree, or the record is too short for the verdict, the answer is "undetermined".
 """
 
+import math
 from dataclasses import replace
 from typing import Any, Protocol, runtime_checkable
 
@@ -18,6 +19,7 @@ from numpy.typing import ArrayLike
 
 from chaosgym.arrays import Array
 from chaosgym.errors import DiagnosisError
+from chaosgym.numbers import number, whole
 from chaosgym.series.noise import RANDOM, predictability
 from chaosgym.series.section_shape import Shape, section_shape
 from chaosgym.series.spectrum import power_spectrum
@@ -28,23 +30,20 @@ from chaosgym.series.stroboscopic import (
     Decay,
     Recurrence,
     as_samples,
-    deviations,
     find_decay,
     find_recurrence,
     scales,
     subtract_bands,
 )
+from chaosgym.series.transient_chaos import CHAOTIC_CYCLES, CHAOTIC_STATISTIC, INITIAL_TRANSIENT, irregular_cycles
 from chaosgym.series.verdict import Diagnosis
 from chaosgym.series.zero_one import zero_one_statistic
 
 TOLERANCE = 1e-5
 """Half range, as a share of the largest modulus, within which a noise-free motion repeats."""
 
-INITIAL_TRANSIENT = 50
-"""Cycles that the motion may take to come near its final form before it counts as transient chaos (thesis 5.2.3)."""
-
-CHAOTIC_STATISTIC, REGULAR_STATISTIC = 0.5, 0.2
-"""0-1 statistic above which a motion is chaotic, and below which it may be quasiperiodic."""
+REGULAR_STATISTIC = 0.2
+"""0-1 statistic below which a motion may be quasiperiodic."""
 
 BROAD_FLOOR, BROAD_FLOOR_SHORT, SHORT_CYCLES = 1e-2, 0.1, 200
 """Spectral floor above which the band is broad; in records below 200 cycles lines overlap, and it must be higher."""
@@ -52,8 +51,8 @@ BROAD_FLOOR, BROAD_FLOOR_SHORT, SHORT_CYCLES = 1e-2, 0.1, 200
 LINE_FLOOR, MAX_LINES = 1e-3, 16
 """Spectral floor below which there are only lines, and how many are still few."""
 
-CHAOTIC_CYCLES, QUASIPERIODIC_CYCLES = 50, 1000
-"""Fewest cycles for either verdict of step II."""
+QUASIPERIODIC_CYCLES = 1000
+"""Fewest cycles for a torus in step II."""
 
 NOISE_ALLOWANCE = 2.0
 """How far the floor may exceed that of the stated sensor error before it counts as a band of its own."""
@@ -64,8 +63,8 @@ class SimulatedRun(Protocol):
     """What the test reads of a simulated run, such as a ``CycleRecord``; each has a row a cycle."""
 
     @property
-    def section(self) -> Array:
-        """State at the start of each cycle, (cycles, states)."""
+    def states(self) -> Array:
+        """State at the start of each cycle, (cycles, states), less what no force depends on."""
         ...
 
     @property
@@ -103,7 +102,7 @@ def two_step_test(
     max_period
         Longest period looked for; it must be seen three times in the second half.
     initial_transient
-        Cycles that the motion may take to come near a periodic motion; if it is irregular for longer, it is transient
+        Cycles that the motion may take to come near a periodic motion; if it is chaotic for longer, that is transient
         chaos.
     repeats_only
         Leave out step II, which costs most: "undetermined" where the motion does not repeat.
@@ -130,10 +129,10 @@ def two_step_test(
     >>> chaosgym.two_step_test(x).nature
     'chaotic'
     """
-    if not 0.0 <= sensor_error < np.inf:
-        raise DiagnosisError(f"sensor_error = {sensor_error!r} is out of range; allowed: finite, 0 or more")
-    if not 0.0 < tolerance < 1.0:
-        raise DiagnosisError(f"tolerance = {tolerance!r} is out of range; allowed: above 0, below 1")
+    sensor_error = number("sensor_error", sensor_error, 0.0, error=DiagnosisError)
+    tolerance = number("tolerance", tolerance, 0.0, 1.0, inside=True, error=DiagnosisError)
+    max_period = whole("max_period", max_period, 1, error=DiagnosisError)
+    initial_transient = whole("initial_transient", initial_transient, 0, error=DiagnosisError)
     samples, series = _observables(x, sensor_error)
     evidence: dict[str, Any] = {"cycles": len(samples)}
     if isinstance(x, SimulatedRun):
@@ -145,15 +144,19 @@ def two_step_test(
     allowed = tolerance + sensor_error / scale
     recurrence = _recurrence(scaled, allowed, max_period, sensor_error)
     evidence |= {"residual": recurrence.residual, "residual_allowed": float(np.max(allowed))}
+    decay = find_decay(scaled, max_period) if recurrence.period is None and sensor_error == 0.0 else None
+    verdict = None
     if recurrence.period is not None:
         exact = [] if sensor_error > 0.0 else series
-        return _repeating(scaled, exact, recurrence, evidence, initial_transient)
-    decay = find_decay(scaled, max_period) if sensor_error == 0.0 else None
-    if decay is not None:
-        return _approaching(decay, evidence)
+        verdict = _repeating(scaled, exact, recurrence, evidence)
+    elif decay is not None:
+        verdict = _approaching(scaled, series, decay, evidence)
+    if verdict is not None:
+        irregular = evidence.get("irregular_cycles", 0)
+        return replace(verdict, transient_chaos=irregular if irregular > initial_transient else 0)
     if repeats_only:
         return _undetermined(evidence, "does not repeat")
-    section = x.section if isinstance(x, SimulatedRun) else samples
+    section = x.states if isinstance(x, SimulatedRun) else samples
     verdict = _step_two(series, section, evidence, sensor_error)
     if verdict.nature == "chaotic" and not isinstance(x, SimulatedRun) and all(map(looks_random, series)):
         warning = "; but no reading can be forecast from those before: for measured readings use judge_peaks"
@@ -163,6 +166,12 @@ def two_step_test(
         hint = f"; with a sensor error {len(samples)} cycles show periods up to {max(1, longest)} only"
         return replace(verdict, reason=verdict.reason + hint)
     return verdict
+
+
+def irregular_start(run: SimulatedRun, period: int) -> int:
+    """Cycles of a run that nears a motion of some period for which it was irregular; see ``irregular_cycles``."""
+    samples, series = _observables(run, 0.0)
+    return irregular_cycles(samples / scales(samples), series, period, len(samples))
 
 
 def looks_random(series: Array) -> bool:
@@ -180,7 +189,7 @@ def _observables(x: SimulatedRun | ArrayLike, sensor_error: float) -> tuple[Arra
         if peaks.shape[1] == 0:
             raise DiagnosisError("the record has no contact, and a sensor error in newton applies to peak forces only")
         return as_samples(peaks), list(as_samples(peaks).T)
-    return as_samples(np.column_stack([x.section, peaks])), [x.displacement, *peaks.T]
+    return as_samples(np.column_stack([x.states, peaks])), [x.displacement, *peaks.T]
 
 
 def _recurrence(scaled: Array, allowed: Array, max_period: int, sensor_error: float) -> Recurrence:
@@ -194,39 +203,35 @@ def _recurrence(scaled: Array, allowed: Array, max_period: int, sensor_error: fl
     return found
 
 
-def _repeating(
-    scaled: Array, series: list[Array], recurrence: Recurrence, evidence: dict[str, Any], initial_transient: int
-) -> Diagnosis:
+def _repeating(scaled: Array, series: list[Array], recurrence: Recurrence, evidence: dict[str, Any]) -> Diagnosis:
     period, settle = recurrence.period, recurrence.settle_cycle
     assert period is not None
     assert settle is not None
     evidence["contraction_per_cycle"] = recurrence.contraction
-    common: dict[str, Any] = {"period": period, "horizon": len(scaled), "settle_cycle": settle, "evidence": evidence}
-    irregular = _irregular_cycles(scaled, series, period, settle)
-    evidence["irregular_cycles"] = irregular
-    if irregular > initial_transient:
-        return Diagnosis(
-            nature="chaotic",
-            margin=0.0,
-            transient=True,
-            **common,
-            reason=f"transient chaos: irregular for {irregular} cycles before it settled on period {period}",
-        )
-    allowed = evidence["residual_allowed"]
-    margin = _decades(allowed, recurrence.residual)
+    evidence["irregular_cycles"] = irregular_cycles(scaled, series, period, settle)
+    margin = _decades(evidence["residual_allowed"], recurrence.residual)
     reason = f"repeats every {'cycle' if period == 1 else f'{period} cycles'} within {recurrence.residual:.1e}"
     if evidence.get("contact") is False:
         reason += "; there is no contact"
-    return Diagnosis(nature="periodic", margin=margin, reason=reason, **common)
+    return Diagnosis(
+        nature="periodic",
+        period=period,
+        margin=margin,
+        reason=reason,
+        horizon=len(scaled),
+        settle_cycle=settle,
+        evidence=evidence,
+    )
 
 
-def _approaching(decay: Decay, evidence: dict[str, Any]) -> Diagnosis:
+def _approaching(scaled: Array, series: list[Array], decay: Decay, evidence: dict[str, Any]) -> Diagnosis:
     evidence["contraction_per_cycle"] = decay.contraction
     if decay.factor < DECAY_FACTOR:
         return _undetermined(
             evidence,
             f"shrinks steadily, but only {decay.factor:.3g} times over the record: too slowly to tell what it ends in",
         )
+    evidence["irregular_cycles"] = irregular_cycles(scaled, series, decay.period, len(scaled))
     reason = f"approaches period {decay.period} by a factor {decay.contraction:.4g} a cycle"
     return Diagnosis(
         nature="periodic",
@@ -247,22 +252,6 @@ def _undetermined(evidence: dict[str, Any], reason: str) -> Diagnosis:
         horizon=evidence["cycles"],
         evidence=evidence,
     )
-
-
-def _irregular_cycles(scaled: Array, series: list[Array], period: int, settle: int) -> int:
-    """How long a motion that settles was irregular: 0 if it approached its final form steadily."""
-    deviation = deviations(scaled, period)[:settle]
-    far = np.flatnonzero(deviation > 0.1)
-    end = int(far[-1]) + 1 if len(far) else 0
-    if end < CHAOTIC_CYCLES or _dies_out(scaled[:settle]):
-        return 0
-    statistics = [zero_one_statistic(s[:end]) for s in series if np.ptp(s[:end]) > 0.0]
-    return end if statistics and np.median(statistics) > CHAOTIC_STATISTIC else 0
-
-
-def _dies_out(scaled: Array) -> bool:
-    decay = find_decay(scaled)
-    return decay is not None and decay.factor >= DECAY_FACTOR
 
 
 def _step_two(series: list[Array], section: Array, evidence: dict[str, Any], sensor_error: float) -> Diagnosis:
@@ -327,4 +316,4 @@ def _decades(larger: float, smaller: float, over: float = 2.0) -> float:
     """Log10 of the ratio divided by ``over``, between 0 and 1."""
     if smaller <= 0.0:
         return 1.0
-    return float(np.clip(np.log10(max(larger, 1e-300) / smaller) / over, 0.0, 1.0))
+    return float(np.clip(math.log10(max(larger, 1e-300) / smaller) / over, 0.0, 1.0))

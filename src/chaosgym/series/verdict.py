@@ -4,9 +4,9 @@ The words are those of the thesis: periodic, quasiperiodic, chaotic (2.3, 5.2) a
 """
 
 from collections.abc import Mapping, Sized
-from dataclasses import dataclass, field, fields
+from dataclasses import dataclass, field, fields, replace
 from types import MappingProxyType
-from typing import Any, Literal, NamedTuple
+from typing import Any, Literal, NamedTuple, Self
 
 Nature = Literal["periodic", "quasiperiodic", "chaotic", "undetermined"]
 """Nature of one response; undetermined where the evidence does not decide."""
@@ -15,10 +15,44 @@ Type = Literal["I", "II", "III", "undetermined"]
 """Type of a response over its tolerance neighbourhood."""
 
 Status = Literal["certified", "agreed", "disputed", "transient", "unresolved"]
-"""certified: proven to machine precision; agreed: all tests that decide agree; disputed: they do not;
-transient: irregular for long before it settled; unresolved: the budget ended first."""
+"""certified: proven to machine precision; agreed: all tests that decide agree; disputed: they do not; unresolved: the
+budget ended first; transient: chaos that died out, in labels by the thesis' definition alone."""
+
+Definition = Literal["settled", "thesis"]
+"""Whose nature a label is: that of the settled motion, or chaotic too where chaos died out (thesis 5.2.3)."""
+
+DEFINITIONS: tuple[Definition, ...] = ("settled", "thesis")
+
+MOST_ESCAPES = 3.0
+"""Escapes in all the time that was seen without any, at most, at 95 % confidence: the rule of three."""
 
 TYPES: tuple[Type, ...] = ("I", "II", "III", "undetermined")
+
+MEANINGS: Mapping[Nature, str] = MappingProxyType(
+    {
+        "periodic": "each period is like the last, so that one period tells all peaks",
+        "quasiperiodic": "no cycle repeats exactly, but peaks keep to a pattern, so that their statistics hold",
+        "chaotic": "single peaks can't be foretold, so that only statistics of many cycles hold",
+        "undetermined": "decide nothing by it yet",
+    }
+)
+"""What a nature means for whoever relies on the machine."""
+
+TYPE_MEANINGS: Mapping[Type, str] = MappingProxyType(
+    {
+        "I": "repeats, and follows a trend when parameters vary",
+        "II": "repeats, but small variations change the force by more than 10 %",
+        "III": "unpredictable in detail, so that only statistics hold",
+        "undetermined": "the nature of the nominal response could not be told",
+    }
+)
+"""What a type means over the tolerances."""
+
+COEXISTING = "repeats, but how it was started decides which of several motions it is"
+"""What Type III means where motions of different force coexist."""
+
+AT_REST = "at rest under the load"
+"""The manner of a response that does not move."""
 
 _EMPTY: Mapping[str, Any] = MappingProxyType({})
 
@@ -46,6 +80,8 @@ class Statement(NamedTuple):
         What the nature rests on that is not known.
     tells_more
         What would tell more.
+    meaning
+        What it means for whoever relies on the machine.
     """
 
     nature: str
@@ -56,6 +92,7 @@ class Statement(NamedTuple):
     other_motions: str
     condition: str
     tells_more: str
+    meaning: str
 
     @property
     def headline(self) -> str:
@@ -63,11 +100,12 @@ class Statement(NamedTuple):
         return f"{self.nature} ({self.certainty})"
 
     def lines(self) -> list[str]:
-        """Headline, reason, and a line for each of the others that has something to say."""
+        """Headline, reason, meaning, and a line for each of the others that has something to say."""
         course = "; ".join(filter(None, (self.transient, self.horizon)))
         others = self.other_motions and f"other motions: {self.other_motions}"
         more = self.tells_more and f"would tell more: {self.tells_more}"
-        return [self.headline, *filter(None, (self.reason, course, others, more))]
+        means = self.meaning and f"means: {self.meaning}"
+        return [self.headline, *filter(None, (self.reason, means, course, others, more))]
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -79,15 +117,17 @@ class Diagnosis:
     nature
         A ``Nature``.
     period
-        Cycles after which a periodic response (or the motion that transient chaos settles on) repeats; else None.
+        Cycles after which a periodic response repeats; else None.
     margin
         Distance of the deciding figure from its threshold: 0 at the threshold, 1 where there is no doubt.
     reason
         One sentence for people.
     evidence
         Figures of each step; numbers, strings and None only, so that it can be written as JSON.
-    transient
-        True where the response was irregular for long and then settled: transient chaos.
+    transient_chaos
+        Cycles for which the response was chaotic before it settled; 0 where it settled soon or steadily.
+    manner
+        What more there is to say of the settled motion, such as "without contact" or "neutral"; empty for most.
     status
         A ``Status``; None where a single test was run.
     horizon
@@ -119,7 +159,8 @@ class Diagnosis:
     margin: float
     reason: str
     evidence: Mapping[str, Any] = field(default_factory=lambda: _EMPTY, repr=False)
-    transient: bool = False
+    transient_chaos: int = 0
+    manner: str = ""
     status: Status | None = None
     horizon: int | None = None
     settle_cycle: int | None = None
@@ -131,9 +172,43 @@ class Diagnosis:
 
     @property
     def words(self) -> str:
-        """Nature, period and condition, such as "periodic, period 2"."""
-        told = f"{self.nature}, period {self.period}" if self.period else self.nature
-        return f"{told}, {self.condition}" if self.condition else told
+        """Nature, period and condition, such as "periodic, period 2"; how long chaos lasted, or lasts at least."""
+        if self.nature == "chaotic" and self.transient_chaos:  # by the thesis' definition
+            return f"chaotic for {self.transient_chaos} cycles, then period {self.period}"
+        if self.manner == AT_REST:
+            told = AT_REST
+        elif self.nature == "chaotic" and self.horizon is not None:
+            told = f"chaotic for at least {self.horizon} cycles"
+        else:
+            told = _listed(self.nature, f"period {self.period}" if self.period else "", self.manner)
+        after = f"after {self.transient_chaos} cycles of transient chaos" if self.transient_chaos else ""
+        return _listed(told, after, self.condition)
+
+    def labelled(self, definition: Definition) -> Self:
+        """The verdict as a label by a definition.
+
+        By that of the thesis (5.2.3) a response whose history repeats only after transient chaos counts as chaotic,
+        with the status "transient" and the period that it ended on.
+
+        Examples
+        --------
+        >>> x = [0.3]
+        >>> for n in range(599):
+        ...     x.append((4.0 if n < 200 else 3.83) * x[-1] * (1.0 - x[-1]))
+        >>> verdict = chaosgym.two_step_test(x)
+        >>> verdict.nature, verdict.labelled("thesis").nature
+        ('periodic', 'chaotic')
+        """
+        repeats = self.settle_cycle is not None and self.settle_cycle < (self.horizon or 0)
+        if definition == "settled" or not self.transient_chaos or not repeats:
+            return self
+        return replace(
+            self,
+            nature="chaotic",
+            status="transient",
+            margin=self.margin if self.status == "certified" else 0.0,
+            reason=f"transient chaos for {self.transient_chaos} cycles; then {self.reason}",
+        )
 
     @property
     def statement(self) -> Statement:
@@ -153,18 +228,22 @@ class Diagnosis:
             other_motions="; ".join(filter(None, (*self.other_motions, self.searched))),
             condition=self.condition,
             tells_more=_either(self.tells_more),
+            meaning=MEANINGS[self.nature],
         )
 
     def _transient(self) -> str:
         if not self.settle_cycle:
             return ""
-        return f"{'irregular' if self.transient else 'settles'} for {self.settle_cycle} cycles"
+        irregular = self.transient_chaos and f"chaotic for {self.transient_chaos} cycles, "
+        return f"{irregular or ''}settles for {self.settle_cycle} cycles"
 
     def _horizon(self) -> str:
         if self.horizon is None or self.status == "certified":
             return ""  # a proof needs none
-        lasts = "; no run proves that chaos lasts" if self.nature == "chaotic" else ""
-        return f"seen over {self.horizon} cycles{lasts}"
+        if self.nature != "chaotic":
+            return f"seen over {self.horizon} cycles"
+        rate = escape_rate(self.horizon)
+        return f"seen over {self.horizon} cycles: its chaos ends at a rate of at most {rate:.1e} a cycle (95 %)"
 
     def as_dict(self) -> dict[str, Any]:
         """Return plain values for JSON."""
@@ -172,6 +251,23 @@ class Diagnosis:
         lists = {name: list(plain[name]) for name in ("other_motions", "tells_more")}
         told = {"evidence": dict(self.evidence), "votes": dict(self.votes), "statement": self.statement._asdict()}
         return {**plain, **lists, **told}
+
+
+def escape_rate(cycles: int) -> float:
+    """Bound on the rate [1/cycle] at which chaos ends that did not in so many cycles, at 95 % confidence.
+
+    Examples
+    --------
+    >>> from chaosgym.series.verdict import escape_rate
+    >>> escape_rate(3000)
+    0.001
+    """
+    return MOST_ESCAPES / cycles
+
+
+def _listed(*phrases: str) -> str:
+    """The phrases that are not empty, with commas."""
+    return ", ".join(filter(None, phrases))
 
 
 def _either(phrases: tuple[str, ...]) -> str:

@@ -2,14 +2,7 @@
 
 from chaosgym.machines.integrators import ExactEvents, Integrator, RungeKutta4
 from chaosgym.simulation.record import CycleRecord, MotionState
-from chaosgym.simulation.run import (
-    begin_state,
-    parallel_map,
-    rest_state,
-    simulate,
-    simulate_many,
-    simulate_with_deviations,
-)
+from chaosgym.simulation.run import begin_state, rest_state, simulate, simulate_with_deviations
 
 __all__ = [
     "CycleRecord",
@@ -18,9 +11,7 @@ __all__ = [
     "MotionState",
     "RungeKutta4",
     "begin_state",
-    "parallel_map",
     "rest_state",
     "simulate",
-    "simulate_many",
     "simulate_with_deviations",
 ]

@@ -18,6 +18,8 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from chaosgym.arrays import Array
+from chaosgym.core import matrices
+from chaosgym.core.matrices import product
 from chaosgym.errors import SimulationError
 from chaosgym.simulation.record import CycleRecord
 
@@ -63,16 +65,20 @@ def modal_history(record: CycleRecord, rows: ArrayLike | None = None) -> ModalHi
 
     def load(k: int) -> Array:
         phase = 2.0 * np.pi * k / samples * orders
-        drive = np.cos(phase) @ parts.drive[:, 0] + np.sin(phase) @ parts.drive[:, 1] + parts.static
-        return np.asarray(drive - (joints[:, k] if k < samples else after) @ parts.joints)
+        drive = (
+            product(matrices.cos(phase), parts.drive[:, 0])
+            + product(matrices.sin(phase), parts.drive[:, 1])
+            + parts.static
+        )
+        return np.asarray(drive - product(joints[:, k] if k < samples else after, parts.joints))
 
     shown, state, largest, ends = np.empty((cycles, samples, len(seen))), record.section.copy(), 0.0, record.section[1:]
     held = load(0)
     for k in range(samples):
-        shown[:, k] = state[:, :n] @ seen.T
+        shown[:, k] = product(state[:, :n], seen.T)
         largest = max(largest, float(np.abs(state[:, :n]).max()))
         following = load(k + 1)
-        state = state @ step + held @ now + following @ ahead
+        state = product(state, step) + product(held, now) + product(following, ahead)
         held = following
     ends = np.concatenate([ends, record.final_state.coordinates[None]])
     miss = float(np.abs(state[:, :n] - ends[:, :n]).max())
@@ -81,8 +87,6 @@ def modal_history(record: CycleRecord, rows: ArrayLike | None = None) -> ModalHi
 
 def _propagators(stiffness: Array, damping: Array, interval: float) -> tuple[Array, Array, Array]:
     """Transposed matrices that take force at the beginning, force at the end, and state over an interval [s]."""
-    from scipy.linalg import expm  # slow to import, and few questions need it
-
     n = len(stiffness)
     generator = np.block([[np.zeros((n, n)), np.eye(n)], [-np.diag(stiffness), -damping]])
     inputs = np.concatenate([np.zeros((n, n)), np.eye(n)])
@@ -90,6 +94,6 @@ def _propagators(stiffness: Array, damping: Array, interval: float) -> tuple[Arr
     whole = np.zeros((4 * n, 4 * n))
     whole[: 2 * n, : 2 * n], whole[: 2 * n, 2 * n : 3 * n] = generator * interval, inputs * interval
     whole[2 * n : 3 * n, 3 * n :] = np.eye(n)
-    found = expm(whole)
+    found = matrices.expm(whole)
     step, held, ramp = found[: 2 * n, : 2 * n], found[: 2 * n, 2 * n : 3 * n], found[: 2 * n, 3 * n :]
     return (held - ramp).T, ramp.T, step.T

@@ -110,6 +110,13 @@ class CycleRecord:
         return f"<{len(self)} cycles of {self.machine.name}>"
 
     @property
+    def states(self) -> Array:
+        """``section`` less how far free bodies have gone, on which no force depends, (n_cycles, n_states)."""
+        from chaosgym.machines.ignorable import relative  # a simulation alone does without
+
+        return relative(self.machine, self.section)
+
+    @property
     def time(self) -> Array:
         """Instants [s] of the samples of ``history`` from the first recorded cycle on, (n_cycles * samples,)."""
         if self.history is None:

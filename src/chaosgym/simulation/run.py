@@ -4,13 +4,10 @@ record = simulate(ImpactBeam(excitation_frequency=19.0), cycles=100, transient=2
 record.peak_force          # (100, 2) newton, upper and lower surface
 """
 
-import os
 import time
-from collections.abc import Callable, Iterable, Mapping, Sequence
-from concurrent.futures import ThreadPoolExecutor
+from collections.abc import Mapping
 from contextlib import nullcontext
 from dataclasses import replace
-from functools import partial
 from itertools import pairwise
 from typing import Any
 
@@ -26,10 +23,14 @@ from chaosgym.errors import ParameterError, SimulationError
 from chaosgym.machines.integrators import ExactEvents, Integrator
 from chaosgym.machines.machine import Machine
 from chaosgym.machines.parameters import field_named, parameters_of, with_settings
+from chaosgym.numbers import whole
 from chaosgym.simulation.record import CycleRecord, MotionState, joined
 
 FIRST_SLICE, MAX_GROWTH = 16, 8.0
 """Cycles of the first call of a kernel, and how much longer than the last one a call may be."""
+
+MOST_RECORDED = 10**8
+"""Cycles, or samples of a history, that one record may hold: some ten gigabytes."""
 
 PATIENCE = 2.0
 """Seconds after which a progress bar appears."""
@@ -48,7 +49,7 @@ def _run(
     bar: Any = None,
 ) -> tuple[int, int, CycleRecord]:
     """Status of the kernel, number of cycles that it finished, and the record."""
-    if not (isinstance(integrator, ExactEvents) or machine.runs_fixed_steps):
+    if not (isinstance(integrator, ExactEvents) or machine.moving.fixed_steps):
         raise ParameterError(f"integrator = {integrator} does not run {machine.name}; allowed: ExactEvents(...)")
     arrays = machine.arrays(cycles, samples)
     final = MotionState(state.coordinates.copy(), state.bouncing.copy())
@@ -129,12 +130,6 @@ def _initial(machine: Machine, given: MotionState | ArrayLike | None) -> MotionS
     return state
 
 
-def _count(name: str, value: int, low: int) -> int:
-    if isinstance(value, bool) or int(value) != value or value < low:
-        raise ParameterError(f"{name} = {value!r} is out of range; allowed: whole numbers from {low} on")
-    return int(value)
-
-
 def simulate(
     machine: Machine,
     cycles: int,
@@ -194,9 +189,8 @@ def simulate(
     >>> float(drifted.operation["excitation_frequency"][-1])
     20.0
     """
-    cycles = _count("cycles", cycles, 1)
-    transient = _count("transient", transient, 0)
-    samples_per_cycle = _count("samples_per_cycle", samples_per_cycle, 0)
+    cycles, transient = whole("cycles", cycles, 1, MOST_RECORDED), whole("transient", transient, 0)
+    samples_per_cycle = whole("samples_per_cycle", samples_per_cycle, 0, MOST_RECORDED // cycles)
     integrator = integrator or machine.default_integrator
     state, first = _initial(machine, initial_state), 0
     table = _operation(machine, operation, cycles) if operation else None
@@ -216,8 +210,8 @@ def simulate(
                 first += count
                 if number:
                     records.append(record)
-    whole = joined(records) if len(records) > 1 else records[0]
-    return whole if table is None else replace(whole, operation=table)
+    record = joined(records) if len(records) > 1 else records[0]
+    return record if table is None else replace(record, operation=table)
 
 
 def _operation(machine: Machine, given: Mapping[str, ArrayLike], cycles: int) -> NDArray[Any]:
@@ -264,7 +258,7 @@ def simulate_with_deviations(
     orthonormal: bool = True,
     integrator: ExactEvents | None = None,
 ) -> tuple[CycleRecord, Array, Array]:
-    """Run a machine that ``carries_deviations`` and take small ones of its state through every contact, exactly.
+    """Run a machine whose ``moving`` has deviations and take small ones of its state through every contact, exactly.
 
     Parameters
     ----------
@@ -286,7 +280,7 @@ def simulate_with_deviations(
     ParameterError, SimulationError
         As ``simulate``.
     """
-    cycles = _count("cycles", cycles, 1)
+    cycles = whole("cycles", cycles, 1, MOST_RECORDED)
     state = _initial(machine, initial_state)
     vectors = np.array(deviations, dtype=float, ndmin=2)
     if vectors.shape[1] != len(state.coordinates) or not np.all(np.isfinite(vectors)):
@@ -306,58 +300,3 @@ def _failure(machine: Machine, outcome: int, cycle: int, integrator: Integrator)
     known = machine.instabilities if outcome == status.DIVERGED else ()
     told = f"{status.MESSAGES[outcome]} in cycle {cycle} with {integrator}"
     return SimulationError("; ".join([*known, told, f"{type(machine).__name__}({settings})"]))
-
-
-def simulate_many(
-    machines: Sequence[Machine],
-    cycles: int,
-    *,
-    transient: int = 0,
-    integrator: Integrator | None = None,
-    workers: int | None = None,
-    progress: bool = False,
-) -> list[CycleRecord]:
-    """Run many machines side by side on threads: the kernels release the interpreter lock.
-
-    Parameters
-    ----------
-    machines
-        What to run, each from rest.
-    cycles, transient, integrator
-        As for ``simulate``.
-    workers
-        Number of threads; all processors by default.
-    progress
-        Show a progress bar on standard error.
-
-    Returns
-    -------
-    list of CycleRecord, in the order of ``machines``.
-
-    Examples
-    --------
-    >>> beams = [chaosgym.ImpactBeam(excitation_frequency=speed) for speed in (12.0, 19.0)]
-    >>> [float(record.peak_force.max().round(1)) for record in chaosgym.simulate_many(beams, 20, transient=200)]
-    [32.4, 28.3]
-    """
-    one = partial(simulate, cycles=cycles, transient=transient, integrator=integrator)
-    return parallel_map(one, machines, workers=workers, progress="simulate" if progress else None)
-
-
-def parallel_map(
-    function: Callable[[Any], Any], items: Iterable[Any], *, workers: int | None = None, progress: str | None = None
-) -> list[Any]:
-    """Apply a function that spends its time in kernels to every item, on threads; results in order.
-
-    ``progress`` names a progress bar on standard error; None shows none.
-
-    Examples
-    --------
-    >>> from chaosgym.simulation import parallel_map
-    >>> parallel_map(lambda speed: chaosgym.SliderCrank(crank_speed=speed).cycle_period, [200.0, 300.0])
-    [0.3, 0.2]
-    """
-    items = list(items)
-    with ThreadPoolExecutor(max_workers=workers or os.cpu_count() or 1) as pool:
-        results = pool.map(function, items)
-        return list(tqdm(results, total=len(items), desc=progress, disable=progress is None, unit="machine"))

@@ -9,7 +9,8 @@ import numpy as np
 
 from chaosgym.arrays import Array
 from chaosgym.errors import ParameterError
-from chaosgym.units import parse_option
+from chaosgym.numbers import number, whole
+from chaosgym.units import as_float, parse_option
 
 Scale = Literal["lin", "log"]
 SCALES: tuple[Scale, ...] = ("lin", "log")
@@ -38,15 +39,17 @@ class Axis:
     scale: Scale = "lin"
 
     def __post_init__(self) -> None:
+        for name in ("low", "high"):
+            number(f"{name} end of axis {self.field}", getattr(self, name), -np.inf)
         shown = f"axis {self.field} = {self.low:g}:{self.high:g}"
-        if not np.isfinite([self.low, self.high]).all() or self.low >= self.high:
+        if self.low >= self.high:
             raise ParameterError(f"{shown} is empty or reversed; allowed: LOW below HIGH")
         if self.scale not in SCALES:
             raise ParameterError(f"{shown} has scale {self.scale!r}; allowed: lin, log")
         if self.scale == "log" and self.low <= 0.0:
             raise ParameterError(f"{shown} can't be logarithmic; allowed: LOW above 0")
-        if self.count is not None and not 2 <= self.count <= 10**6:
-            raise ParameterError(f"{shown} has {self.count} points; allowed: 2 to 1000000")
+        if self.count is not None:
+            whole(f"count of axis {self.field}", self.count, 2, 10**6)
 
     @classmethod
     def parse(cls, text: str, units: Mapping[str, str] = NO_UNITS) -> "Axis":
@@ -78,4 +81,4 @@ class Axis:
 
 def _value(field: str, text: str, units: Mapping[str, str]) -> float:
     """Number in the unit of its field, with or without a unit of its own."""
-    return parse_option(field, text, units[field], "") if field in units else float(text)
+    return parse_option(field, text, units[field], "") if field in units else as_float(text)

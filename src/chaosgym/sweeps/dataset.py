@@ -16,9 +16,11 @@ import pyarrow.parquet as pq
 
 from chaosgym import files
 from chaosgym.errors import DatasetError
-from chaosgym.files import first_line, parquet_of
+from chaosgym.files import first_line
 from chaosgym.machines.parameters import parameters_of
-from chaosgym.sweeps.plan import WITHOUT_SEARCH, SweepPlan
+from chaosgym.parquet import parquet_of
+from chaosgym.series.verdict import Definition
+from chaosgym.sweeps.plan import UNSTATED, WITHOUT_SEARCH, SweepPlan
 
 WINDOW = 64
 """Cycles of a signal."""
@@ -54,6 +56,12 @@ def _figure(unit: str, meaning: str) -> Column:
     return Column(pa.float32(), unit, meaning)
 
 
+NATURE_OF: Mapping[str, str] = {
+    "settled": "that of the settled motion",
+    "thesis": "chaotic too where the history repeats only after transient chaos, as in thesis 5.2.3",
+}
+"""Whose nature a row has, by the definition of its plan."""
+
 CROSS_COLUMNS: Mapping[str, Column] = {
     "machine": Column(pa.int32(), "-", "the five rows of one cross: centre, speed below and above, clearance likewise"),
     "split": Column(pa.string(), "-", "train, validation or test; whole machines"),
@@ -66,6 +74,10 @@ LABELS: Mapping[str, Column] = {
     "type_neighbours": Column(pa.int32(), "-", "neighbours that the response type rests on; fewer at a border"),
     "full_response_type": Column(
         pa.string(), "-", "I, II, III or undetermined over all tolerances and three initial states, by runs of its own"
+    ),
+    "motions": Column(pa.int32(), "-", "motions that the search of a full type met; null where it made none"),
+    "other_motions": Column(
+        pa.string(), "-", "the other ones: force, share of the starts, where each is stable; and how far was looked"
     ),
     "status": Column(pa.string(), "-", STATUS_MEANING),
     "margin": _figure("-", "distance of the verdict from its threshold: 0 on it, 1 without doubt"),
@@ -94,11 +106,16 @@ LABELS: Mapping[str, Column] = {
     "contact_fraction": _figure("-", "share of the time in contact, both sides"),
     "bounce_fraction": _figure("-", "longest bouncing before sustained contact, in half cycles"),
     "settle_cycle": Column(pa.int32(), "cycles", "first cycle from rest that repeats; null if none does"),
+    "transient_chaos": Column(pa.int32(), "cycles", "cycles from rest for which a response that settled was chaotic"),
     "horizon": Column(pa.int32(), "cycles", "cycles from rest that the verdict rests on; the last half is judged"),
     "cycles_used": Column(pa.int32(), "cycles", "cycles computed for the verdict, Newton's method included"),
+    "headline": Column(pa.string(), "-", "the verdict in words, as every command prints it; null if failed"),
     "reason": Column(pa.string(), "-", "why the verdict is what it is, or why the run failed"),
 }
 """Labels and their evidence."""
+
+LATER = ("two_step", "transient_chaos", "headline", "motions", "other_motions")
+"""Columns that sweeps of former versions lack."""
 
 _NEIGHBOURS = "I, II, III or undetermined over the neighbours in {fields} up to one tolerance away, one initial state"
 _CROSS = "I, II, III or undetermined over the other four points of the cross, one initial state; of centres only"
@@ -140,6 +157,8 @@ def schema(plan: SweepPlan, settings: Mapping[str, Any]) -> pa.Schema:
     reach = plan.type_reach()
     about_type = _NEIGHBOURS.format(fields=" and ".join(reach)) if reach else _FULL
     about_type = _CROSS if plan.sampling == "crosses" else about_type
+    meaning = f"{LABELS['nature'].meaning}; {NATURE_OF[plan.definition]}"
+    columns["nature"] = LABELS["nature"]._replace(meaning=meaning)
     columns["response_type"] = LABELS["response_type"]._replace(meaning=about_type)
     if plan.full_types and plan.initial_states != WITHOUT_SEARCH:
         searched = f"all tolerances and from {plan.initial_states} random starts, by runs of its own"
@@ -183,6 +202,12 @@ class LabelledSweep:
         if self.settings["sampling"] != "grid":
             return (len(self.table),)
         return tuple(axis["count"] for axis in self.settings["axes"])
+
+    @property
+    def definition(self) -> Definition:
+        """Whose nature its rows have."""
+        stated: Definition = self.settings.get("definition", UNSTATED)
+        return stated
 
     @property
     def plan(self) -> SweepPlan:
@@ -238,12 +263,12 @@ def read_sweep(folder: str | Path, columns: list[str] | None = None) -> Labelled
             f"{folder} holds no finished sweep (no {DATA_FILE}); run `chaosgym sweep` again to finish it"
         )
     try:
-        return _understood(parquet_of(path, columns))
+        return _understood(parquet_of(path, columns), columns)
     except DAMAGE as error:
         raise DatasetError(f"{path} can't be read as a chaosgym sweep: {first_line(error)}") from error
 
 
-def _understood(table: pa.Table) -> LabelledSweep:
+def _understood(table: pa.Table, columns: list[str] | None) -> LabelledSweep:
     """Sweep of a table, all of whose metadata can be read: pages have checksums, the footer has none."""
     metadata = table.schema.metadata
     sweep = LabelledSweep(table, json.loads(metadata[b"chaosgym"]))
@@ -254,7 +279,24 @@ def _understood(table: pa.Table) -> LabelledSweep:
     ):
         if not isinstance(values, kind):
             raise TypeError(f"its metadata hold a {type(values).__name__} for a {kind.__name__}")
-    for field in table.schema:
-        for key in (b"unit", b"meaning"):
-            field.metadata[key].decode()
+    _check_columns(table.schema, schema(sweep.plan, sweep.settings), columns)
     return sweep
+
+
+def _alike(one: pa.DataType, other: pa.DataType) -> bool:
+    """Whether two types are one, or integers of other widths, as of sweeps of former versions."""
+    return bool(one == other or (pa.types.is_integer(one) and pa.types.is_integer(other)))
+
+
+def _check_columns(there: pa.Schema, needed: pa.Schema, columns: list[str] | None) -> None:
+    """Refuse a table that lacks a column of its sweep, or has it in another type or without unit and meaning."""
+    for name in (one for one in needed.names if one not in LATER or one in there.names) if columns is None else columns:
+        if there.get_field_index(name) < 0:
+            raise ValueError(f"it has no column {name!r}, or has it twice; allowed: all of {', '.join(needed.names)}")
+        field = there.field(name)
+        if name in needed.names and not _alike(field.type, needed.field(name).type):
+            raise ValueError(f"its column {name!r} holds {field.type}; allowed: {needed.field(name).type}")
+        for key in (b"unit", b"meaning"):
+            if key not in (field.metadata or {}):
+                raise ValueError(f"its column {name!r} lacks its {key.decode()}")
+            field.metadata[key].decode()

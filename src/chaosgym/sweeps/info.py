@@ -1,4 +1,4 @@
-"""What a sweep's folder holds: rows, classes, faults, and how well two ways to a type agree."""
+"""What a sweep's folder holds: rows, classes, faults, its calm region, and how well two ways to a type agree."""
 
 import json
 from collections import Counter
@@ -7,11 +7,16 @@ from typing import Any
 
 import numpy as np
 
+from chaosgym.diagnosis.calm_region import CalmRegion, calm_region, searched_by
 from chaosgym.errors import DatasetError
 from chaosgym.files import first_line
+from chaosgym.machines.accuracy import error_spread
 from chaosgym.sweeps.dataset import DAMAGE, DATA_FILE, LabelledSweep, read_sweep
 from chaosgym.sweeps.folder import CHUNK_FOLDER, PLAN_FILE, read_plan_file
 from chaosgym.sweeps.plan import SweepPlan
+
+ESTIMATED = 32
+"""Machines of a sweep whose error is estimated."""
 
 CLASSES = ("nature", "response_type", "full_response_type", "status", "split")
 
@@ -22,7 +27,8 @@ def dataset_info(folder: str | Path) -> dict[str, Any]:
     Returns
     -------
     dict
-        ``machine``, ``complete``, ``rows`` (finished and planned), ``classes`` (counts by label column; by split too),
+        ``machine``, ``complete``, ``rows`` (finished and planned), ``model`` (rung, numbers, and the estimated error of
+        the peak force at ``ESTIMATED`` points), ``classes`` (counts by label column; by split too),
         ``faults``, ``types`` (agreement of the two type columns), ``settings``, ``definitions`` and ``provenance``; of
         an unfinished sweep without classes and faults.
 
@@ -47,7 +53,8 @@ def dataset_info(folder: str | Path) -> dict[str, Any]:
         "machine": settings["machine"],
         "complete": False,
         "rows": {"finished": rows, "planned": len(plan)},
-        "settings": settings,
+        "model": model_of(plan),
+        "settings": {"definition": plan.definition, **settings},
     }
 
 
@@ -64,14 +71,26 @@ def _finished(sweep: LabelledSweep, size: int) -> dict[str, Any]:
         "machine": sweep.settings["machine"],
         "complete": True,
         "rows": {"finished": len(sweep.table), "planned": len(sweep.plan)},
+        "model": model_of(sweep.plan),
         "bytes": size,
         "classes": classes,
         "faults": _faults(sweep),
         "two_step": _two_step(sweep),
         "types": compare_types(sweep),
-        "settings": sweep.settings,
+        "settings": {"definition": sweep.definition, **sweep.settings},
         "definitions": json.loads(metadata[b"definitions"]),
         "provenance": sweep.provenance,
+    }
+
+
+def model_of(plan: SweepPlan) -> dict[str, Any]:
+    """The one model of a sweep's machines, and how far their peak forces may be off."""
+    spread = error_spread(plan.sample(ESTIMATED))
+    return {
+        "rung": plan.machine.rung,
+        "numbers": dict(plan.machine.model_numbers),
+        "told": spread.line,
+        "estimated_error": spread._asdict(),
     }
 
 
@@ -126,3 +145,39 @@ def compare_types(sweep: LabelledSweep) -> dict[str, Any] | None:
         "disagreement": float(np.mean(shared[both] != full[both])),
         "pairs": {f"{a} against {b}": count for (a, b), count in sorted(pairs.items())},
     }
+
+
+def calm_region_of(sweep: LabelledSweep) -> CalmRegion | None:
+    """Find the calm region of a grid over speed, clearance or both.
+
+    Returns
+    -------
+    CalmRegion or None
+        None where the points are no such grid.
+    """
+    plan = sweep.plan
+    fields = (plan.machine.speed_field, plan.machine.clearance_field)
+    everywhere = plan.full_types == 1.0
+    types = sweep.column("full_response_type" if everywhere else "response_type")
+    types = np.array([kind or "undetermined" for kind in types.tolist()])
+    if plan.sampling != "grid" or not set(plan.fields) <= set(fields):
+        return None
+    speeds, clearances = (
+        np.unique(sweep.column(name)) if name in plan.fields else [getattr(plan.machine, name)] for name in fields
+    )
+    grid = types.reshape(sweep.shape)  # its first axis is the plan's first field
+    grid = grid if plan.fields[0] == fields[0] else grid.T
+    searched = searched_by(plan.machine, plan.initial_states if everywhere else 1)
+    grid = grid.reshape(len(speeds), len(clearances))
+    return calm_region(plan.machine, speeds, clearances, grid, searched, _settled_by(sweep))
+
+
+def _settled_by(sweep: LabelledSweep) -> str:
+    """What would tell the types that are unknown."""
+    plan = sweep.plan
+    untyped = set(sweep.column("nature")[sweep.column("response_type") == "undetermined"])
+    checked = bool(plan.type_reach()) or plan.full_types == 1.0
+    found = [] if checked else ["--label full-types=1, or a finer grid, checks their tolerances"]
+    if None in untyped or "undetermined" in untyped:
+        found.append(f"--budget {4 * plan.budget} looks longer")
+    return ", and ".join(found)

@@ -1,4 +1,4 @@
-"""The labels of points: of each, one run from rest, judged in stages; then the types, which rest on neighbours too."""
+"""The labels of points: of each, one run, judged in stages; then the types, which rest on neighbours too."""
 
 import platform
 import subprocess
@@ -12,6 +12,7 @@ import llvmlite.binding
 import numpy as np
 import pyarrow as pa
 
+from chaosgym.branches.coexistence import coexistence
 from chaosgym.core.kernel_cache import source_digest
 from chaosgym.diagnosis import bounce_fraction, response_type
 from chaosgym.diagnosis.diagnose import diagnose_alone
@@ -19,6 +20,7 @@ from chaosgym.diagnosis.type_rule import CROSS, type_of_cross, types_on_grid
 from chaosgym.errors import DiagnosisError, ParameterError, SimulationError, UnfinishedError
 from chaosgym.machines import Machine
 from chaosgym.series.stroboscopic import irregularity
+from chaosgym.series.verdict import Definition
 from chaosgym.simulation import CycleRecord, simulate
 from chaosgym.sweeps.dataset import SENSOR_ERROR, SIGNALS, WINDOW, WINDOWS, fixed_fields, schema, signal_columns
 from chaosgym.sweeps.plan import SweepPlan
@@ -61,14 +63,17 @@ RETRY = 8
 """Budgets that a point may take which is undetermined after one."""
 
 
-def label_point(machine: Machine, budget: int, *, signals: bool = False) -> dict[str, Any]:
-    """Label one machine; a run that fails is a row with status "failed"."""
+def label_point(
+    machine: Machine, budget: int, *, signals: bool = False, definition: Definition = "settled"
+) -> dict[str, Any]:
+    """Label one machine by a definition; a run that fails is a row with status "failed"."""
     try:
         verdict = diagnose_alone(machine, budget=budget)
         if verdict.nature == "undetermined":
             verdict = diagnose_alone(machine, budget=RETRY * budget)
     except (DiagnosisError, SimulationError) as error:
         return {"status": "failed", "reason": str(error)}
+    verdict = verdict.labelled(definition)
     judged = verdict.judged
     peaks = judged.peaks
     exponent = verdict.evidence["largest_lyapunov_exponent_per_cycle"]
@@ -89,8 +94,10 @@ def label_point(machine: Machine, budget: int, *, signals: bool = False) -> dict
         "contact_fraction": judged.contact_fraction.sum(axis=1).mean(),
         "bounce_fraction": bounce_fraction(judged),
         "settle_cycle": verdict.settle_cycle,
+        "transient_chaos": verdict.transient_chaos,
         "horizon": verdict.horizon,
         "cycles_used": verdict.evidence["cycles_used"],
+        "headline": verdict.statement.headline,
         "reason": verdict.reason,
     }
     kept = _signals(machine, verdict.run) if signals else {}
@@ -100,7 +107,7 @@ def label_point(machine: Machine, budget: int, *, signals: bool = False) -> dict
 
 
 def _signals(machine: Machine, record: CycleRecord) -> dict[str, Any]:
-    """Signals of a run from rest, which goes on if it ended before their last cycle; none if it can't."""
+    """Signals of a run, which goes on if it ended before their last cycle; none if it can't."""
     missing = max(WINDOWS.values()) + WINDOW - len(record)
     try:
         if missing > 0:
@@ -115,11 +122,23 @@ def _signals(machine: Machine, record: CycleRecord) -> dict[str, Any]:
     }
 
 
-def _full_type(machine: Machine, plan: SweepPlan) -> str | None:
+def full_type(machine: Machine, plan: SweepPlan) -> dict[str, Any]:
+    """Type of a machine over all its tolerances, by runs of its own, and its other motions; nothing where they fail."""
     try:
-        return response_type(machine, budget=plan.budget, initial_states=plan.initial_states, workers=1).type
+        found = response_type(
+            machine,
+            budget=plan.budget,
+            initial_states=plan.initial_states,
+            definition=plan.definition,
+            workers=1,
+        )
+        if found.attractors is None:
+            return {"full_response_type": found.type}
+        beside = coexistence(machine, found.centre, found.attractors, workers=1)
     except (DiagnosisError, ParameterError, SimulationError):
-        return None
+        return {}
+    told = "; ".join([found.centre.statement.other_motions, *beside.lines])
+    return {"full_response_type": found.type, "motions": len(found.attractors.motions), "other_motions": told}
 
 
 def label_rows(plan: SweepPlan, rows: range, stop: Event | None = None) -> pa.Table:
@@ -142,11 +161,11 @@ def label_rows(plan: SweepPlan, rows: range, stop: Event | None = None) -> pa.Ta
         except ParameterError as error:
             lines.append({**fixed, **point, "status": "failed", "reason": str(error)})
             continue
-        label = label_point(machine, plan.budget, signals=plan.signals > 0.0)
+        label = label_point(machine, plan.budget, signals=plan.signals > 0.0, definition=plan.definition)
         if not with_signals[index]:
             label = {name: value for name, value in label.items() if name not in signals}
         if with_full_type[index]:
-            label["full_response_type"] = _full_type(machine, plan)
+            label |= full_type(machine, plan)
         lines.append(fixed | point | label)
     if plan.sampling == "crosses":
         for line, number, part in zip(lines, plan.machine_numbers(rows), plan.splits(rows), strict=True):
@@ -180,10 +199,10 @@ def with_response_types(table: pa.Table, plan: SweepPlan, rows: range) -> pa.Tab
 
 
 def _without_neighbours(table: pa.Table) -> pa.Array:
-    """Types on a grid that is too coarse: III where not periodic, else that of runs of its own, or undetermined."""
+    """Types on a grid that is too coarse: III where the point does not repeat, else that of runs of its own."""
     types = []
     for nature, full in zip(table["nature"].to_pylist(), table["full_response_type"].to_pylist(), strict=True):
-        types.append(full or ("III" if nature in ("chaotic", "quasiperiodic") else "undetermined"))
+        types.append("III" if nature in ("chaotic", "quasiperiodic") else full or "undetermined")
     return pa.array(types, pa.string())
 
 

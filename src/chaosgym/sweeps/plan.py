@@ -26,7 +26,9 @@ from chaosgym.diagnosis.response_type import check_initial_states
 from chaosgym.diagnosis.type_rule import CROSS
 from chaosgym.errors import ParameterError
 from chaosgym.machines import MACHINES, Machine
-from chaosgym.machines.parameters import check_parameter, parameters_of, with_settings
+from chaosgym.machines.parameters import USUAL, check_parameter, parameters_of, suggestion, with_settings
+from chaosgym.numbers import MOST_SEED, number, whole
+from chaosgym.series.verdict import DEFINITIONS, Definition
 from chaosgym.sweeps.axes import AXIS_FORM, Axis
 
 Sampling = Literal["grid", "random", "sobol", "crosses"]
@@ -39,9 +41,6 @@ DEFAULT_BUDGET = 400
 
 CHUNK_SIZE = 256
 """Points that are computed and kept together; of crosses the whole ones among them."""
-
-LEAST_STEPS = 0.9
-"""Steps that a tolerance must hold at least, so that neighbours on the grid are neighbours of a response type."""
 
 SPLIT = (("train", 0.70), ("validation", 0.15), ("test", 0.15))
 """Shares of the machines of crosses."""
@@ -75,6 +74,8 @@ class SweepPlan:
         all their neighbours where these are points of the sweep.
     initial_states
         Of these types, as of ``response_type``; 3 in plans that were written without it.
+    definition
+        Of natures and types: "settled", or "thesis", which plans that were written without it have.
 
     Examples
     --------
@@ -93,6 +94,7 @@ class SweepPlan:
     signals: float = 0.0
     full_types: float = 0.0
     initial_states: int = STARTS
+    definition: Definition = "settled"
 
     def __post_init__(self) -> None:
         self._check_fields()
@@ -104,14 +106,14 @@ class SweepPlan:
                 raise ParameterError(f"axis {axis.field} {rule}: {AXIS_FORM}")
         if self.sampling == "crosses":
             self._check_crosses()
-        if self.sampling != "grid" and not 1 <= self.size <= 10**9:
-            raise ParameterError(f"size = {self.size} is out of range; allowed: 1 to 1e9 points")
-        if self.budget < 100:
-            raise ParameterError(f"budget = {self.budget} cycles is out of range; allowed: 100 or more")
+        whole("size", self.size, 0 if self.sampling == "grid" else 1)
+        whole("seed", self.seed, 0, MOST_SEED)
+        whole("budget", self.budget, 100)
         check_initial_states(self.initial_states)
+        if self.definition not in DEFINITIONS:
+            raise ParameterError(f"definition = {self.definition!r} is unknown; allowed: {', '.join(DEFINITIONS)}")
         for name in ("signals", "full_types"):
-            if not 0.0 <= getattr(self, name) <= 1.0:
-                raise ParameterError(f"{name} = {getattr(self, name):g} is out of range; allowed: a share of 0 to 1")
+            number(name, getattr(self, name), 0.0, 1.0)
 
     def _check_fields(self) -> None:
         known = parameters_of(self.machine)
@@ -120,11 +122,13 @@ class SweepPlan:
             raise ParameterError(f"axes {', '.join(names) or '(none)'}: give at least one, each field once")
         for axis in self.axes:
             if axis.field not in known:
-                raise ParameterError(f"axis {axis.field!r} is no field; known fields: {', '.join(known)}")
+                raise ParameterError(f"axis {axis.field!r} is no field{suggestion(axis.field, [*USUAL, *known])}")
             if known[axis.field].choices:
                 raise ParameterError(f"axis {axis.field!r} is a choice and can't be swept; use --set")
             for end in (axis.low, axis.high):
                 check_parameter(self.machine, axis.field, int(end) if self._is_whole(axis.field) else end)
+            if self.machine.initial_state and axis.field in self.machine.model_fields:
+                raise ParameterError(f"axis {axis.field!r} changes the model; an initial state belongs to one")
 
     def _check_crosses(self) -> None:
         """Refuse crosses without speed and clearance, or whose arms leave what is allowed."""
@@ -187,6 +191,12 @@ class SweepPlan:
             columns = self._axis_values(list(self._drawn(rows.start, rows.stop).T))
         return {name: np.round(column) if self._is_whole(name) else column for name, column in columns.items()}
 
+    def sample(self, count: int) -> list[Machine]:
+        """Machines of a few points, spread evenly over the rows."""
+        rows = sorted(set(np.linspace(0, len(self) - 1, count).astype(int).tolist()))
+        at = [self.points(range(row, row + 1)) for row in rows]
+        return [with_settings(self.machine, {name: column[0] for name, column in point.items()}) for point in at]
+
     def _axis_values(self, shares: Sequence[Array]) -> dict[str, Array]:
         return {axis.field: axis.at(share) for axis, share in zip(self.axes, shares, strict=True)}
 
@@ -234,8 +244,10 @@ class SweepPlan:
         return np.asarray(np.arange(rows.start, rows.stop) * GOLDEN % 1.0 < self.signals)
 
     def with_full_type(self, rows: range) -> NDArray[np.bool_]:
-        """Which rows are typed over the full window too, (n_rows,)."""
+        """Which rows are typed over the full window too, (n_rows,): a share of those with all neighbours, or a grid."""
         chosen = np.arange(rows.start, rows.stop) * SILVER % 1.0 < self.full_types
+        if self.sampling == "grid" and self.full_types == 1.0:
+            return np.ones(len(rows), dtype=bool)
         return np.asarray(chosen & (self.type_neighbours(rows) == self.all_neighbours))
 
     def type_neighbours(self, rows: range) -> NDArray[np.int64]:
@@ -273,10 +285,9 @@ class SweepPlan:
         for axis in self.axes if self.sampling == "grid" else ():
             if axis.field in self._cross_fields:
                 middle, following = axis.at(np.array([0.5, 0.5 + 1.0 / ((axis.count or 0) - 1)]))
-                steps = (tolerances[axis.field].at(float(middle), 1.0) - float(middle)) / float(following - middle)
-                if steps < LEAST_STEPS:
+                reach[axis.field] = tolerances[axis.field].steps(float(middle), float(following))
+                if not reach[axis.field]:
                     return {}
-                reach[axis.field] = round(steps)
         return reach
 
     def settings(self) -> dict[str, Any]:
@@ -284,8 +295,12 @@ class SweepPlan:
         described = {name: getattr(self, name) for name in _PLAIN_FIELDS}
         if not self.full_types or self.initial_states == WITHOUT_SEARCH:
             del described["initial_states"]
+        if self.definition == UNSTATED:
+            del described["definition"]
         described["machine"] = self.machine.name
         described["base"] = {name: getattr(self.machine, name) for name in parameters_of(self.machine)}
+        if self.machine.initial_state != self.machine.stated_state:
+            described["initial_state"] = list(self.machine.initial_state)
         described["axes"] = [asdict(axis) for axis in self.axes]
         described["type_reach"] = self.type_reach()
         return described
@@ -294,15 +309,19 @@ class SweepPlan:
     def from_settings(cls, settings: dict[str, Any]) -> "SweepPlan":
         """Return the plan whose ``settings`` these are."""
         machine: Any = MACHINES[settings["machine"]]
+        base = machine(**settings["base"])
         unstated = WITHOUT_SEARCH if settings["full_types"] else STARTS
         return cls(
-            machine(**settings["base"]),
+            base.from_state(settings["initial_state"]) if "initial_state" in settings else base,
             tuple(Axis(**axis) for axis in settings["axes"]),
-            **{name: {"initial_states": unstated, **settings}[name] for name in _PLAIN_FIELDS},
+            **{name: {"initial_states": unstated, "definition": UNSTATED, **settings}[name] for name in _PLAIN_FIELDS},
         )
 
 
-_PLAIN_FIELDS = ("sampling", "size", "seed", "budget", "signals", "full_types", "initial_states")
+_PLAIN_FIELDS = ("sampling", "size", "seed", "budget", "signals", "full_types", "initial_states", "definition")
+
+UNSTATED: Definition = "thesis"
+"""Definition of natures in plans whose settings do not state one."""
 
 WITHOUT_SEARCH = 3
 """Initial states of full types in plans whose settings do not state them."""

@@ -6,7 +6,6 @@ from collections.abc import Iterable, Iterator
 from concurrent.futures import FIRST_COMPLETED, CancelledError, Future, ThreadPoolExecutor, wait
 from contextlib import contextmanager, nullcontext
 from itertools import islice
-from os import cpu_count
 from pathlib import Path
 from threading import Event
 from typing import Any
@@ -16,6 +15,7 @@ from tqdm import tqdm
 
 from chaosgym.errors import DatasetError, UnfinishedError
 from chaosgym.files import claimed, held
+from chaosgym.simulation.parallel import number_of_workers
 from chaosgym.sweeps.dataset import LabelledSweep, read_sweep
 from chaosgym.sweeps.folder import CHUNK_FOLDER, PLAN_FILE, SweepFolder
 from chaosgym.sweeps.label import label_rows
@@ -30,9 +30,8 @@ AHEAD = 4
 CONNECT_SECONDS = 15
 
 
-def on_threads(plan: SweepPlan, chunks: Iterable[range], workers: int | None = None) -> Iterator[Finished]:
-    """Label chunks on threads of this process, one a processor by default."""
-    threads = workers or cpu_count() or 1
+def on_threads(plan: SweepPlan, chunks: Iterable[range], threads: int) -> Iterator[Finished]:
+    """Label chunks on threads of this process."""
     waiting, stop = iter(chunks), Event()
     pool = ThreadPoolExecutor(max_workers=threads)
     try:
@@ -63,7 +62,7 @@ def cluster_at(scheduler: str) -> Iterator[Any]:
         from distributed import Client, KilledWorker
         from distributed.comm import CommClosedError
     except ImportError as error:
-        raise DatasetError(f"--scheduler needs the extra [cluster]: {error}") from None
+        raise DatasetError(f"a Dask cluster needs the extra [cluster]: {error}") from None
     try:
         client = Client(scheduler, timeout=CONNECT_SECONDS)
     except (OSError, ValueError) as error:
@@ -132,6 +131,8 @@ def run_sweep(
 
     Raises
     ------
+    ParameterError
+        If the number of threads is none.
     DatasetError
         If the folder holds anything else, or a damaged chunk. Nothing in it is touched.
     UnfinishedError
@@ -147,6 +148,7 @@ def run_sweep(
     >>> sweep.table["nature"].to_pylist()
     ['periodic', 'periodic', 'chaotic']
     """
+    threads = number_of_workers(workers)
     with (
         cluster_at(scheduler) if scheduler else nullcontext() as client,
         held(claimed(folder, PLAN_FILE, what="run of this sweep"), CHUNK_FOLDER),
@@ -154,7 +156,7 @@ def run_sweep(
         store = SweepFolder(folder, plan, __version__)
         missing = store.missing(repair=repair)
         if missing:
-            done = on_cluster(plan, missing, client) if client else on_threads(plan, missing, workers)
+            done = on_cluster(plan, missing, client) if client else on_threads(plan, missing, threads)
             _keep(store, missing, done, progress)
         if not store.data.is_file():
             store.finish()

@@ -14,7 +14,9 @@ from chaosgym.arrays import Array
 from chaosgym.control.readings import Readings
 from chaosgym.envs.kernels.steps import PLACE
 from chaosgym.envs.memory import irregularity
+from chaosgym.envs.sense import has_sense
 from chaosgym.envs.task import Task
+from chaosgym.errors import ParameterError
 
 Observations = NDArray[np.float32]
 
@@ -45,6 +47,8 @@ class Controller:
     def start(self, envs: Any) -> None:
         """Begin the jobs of a vector environment that has been reset."""
         self.task, self.count = envs.task, envs.num_envs
+        known = hasattr(envs, "nominal") and has_sense(envs.nominal.name)  # a plant has no model
+        self.sure = SURE if known else SURE_OF_RECORDS
         self._readings = Readings(self.task, self.count)
         self._force = np.full((self.count, len(self.task.grid)), np.nan)
         self.begin(envs)
@@ -53,7 +57,17 @@ class Controller:
         """Forget the last jobs."""
 
     def __call__(self, observations: Observations) -> NDArray[np.float32]:
-        """Return the actions (n, 1); a step without a usable reading holds, as ``control.readings`` says."""
+        """Return the actions (n, 1); a step without a usable reading holds, as ``control.readings`` says.
+
+        Raises
+        ------
+        ParameterError
+            If it has not been started.
+        """
+        if not hasattr(self, "_readings"):
+            raise ParameterError(
+                f"{type(self).__name__} knows no task yet; call start(envs) of it first, or evaluate(policy, id)"
+            )
         observations = self._readings.take(observations)
         speeds = self._lighter(observations, self.speeds(observations))
         if self.task.drive == "motor":  # the set-point is ahead by what the motor slipped in the last step
@@ -101,17 +115,21 @@ THRESHOLD = 1.17
 """Measured irregularity, in units of the sensor's error, above which motion is irregular (set on other machines)."""
 
 
-SURE = 0.9
-"""Probability of the trained classifier above which motion is irregular (calibrated on other machines): fluctuations of
-the speed, which it was not trained with, look slightly irregular to it."""
+SURE = 0.7
+"""Probability of the trained sense above which motion is irregular (chosen on machines of training)."""
 
 
-def irregular(observations: Observations, task: Task, threshold: float, softness: float) -> Array:
+SURE_OF_RECORDS = 0.9
+"""The same where no sense is shipped and the classifier of records answers (calibrated on other machines): fluctuations
+of the speed, which it was not trained with, look slightly irregular to it."""
+
+
+def irregular(observations: Observations, task: Task, threshold: float, softness: float, sure: float) -> Array:
     """Probability (n,) that the motion is irregular, by the measured irregularity in units of the sensor's error.
 
-    Where the task gives the trained classifier's, 1 if that is sure and 0 if not.
+    Where the task gives that of the trained sense, 1 if it is above ``sure`` and 0 if not.
     """
     if task.classifier == "on":
-        return (added(observations, task, "irregular_probability") > SURE).astype(float)
+        return (added(observations, task, "irregular_probability") > sure).astype(float)
     felt = irregularity(observations) / max(task.sensor_error, 1e-3 * task.reference_force)
     return np.asarray(0.5 + 0.5 * np.tanh(0.5 * (felt - threshold) / softness))

@@ -24,7 +24,7 @@ class BackOff(Controller):
     spacing
         Of the ladder, in trim steps.
     classified
-        Whether the trained classifier of records says what is irregular, instead of a threshold.
+        Whether the trained sense of ``classifier="on"`` says what is irregular, instead of a threshold.
     """
 
     knows = "measurements"
@@ -54,7 +54,7 @@ class BackOff(Controller):
         demand, speed, every = seen(observations, "demand"), seen(observations, "speed"), np.arange(self.count)
         wanted = np.clip(self._demand + self.ladder[self._rung], self.task.lowest_speed, self.task.highest_speed)
         there = np.abs(speed - wanted) < 0.3 * self.task.trim_step
-        wild = irregular(observations, self.task, THRESHOLD, 1e-3) > 0.5
+        wild = irregular(observations, self.task, THRESHOLD, 1e-3, self.sure) > 0.5
         new = demand != self._demand
         self._demand = demand
         self._wild = np.where(there & wild & ~new, self._wild + 1, np.where(there, 0, self._wild))
@@ -95,7 +95,7 @@ class BestFelt(Controller):
         """Take the step into the means of its speed."""
         here = np.arange(self.count), place_of(seen(observations, "speed"), self.task)
         self._steps[here] += 1.0
-        wild = irregular(observations, self.task, THRESHOLD, 1e-3)
+        wild = irregular(observations, self.task, THRESHOLD, 1e-3, self.sure)
         self._share[here] += (wild - self._share[here]) / self._steps[here]
         self._peak[here] += (seen(observations, "mean_peak_force") - self._peak[here]) / self._steps[here]
 
@@ -142,7 +142,7 @@ class Bandit(Controller):
         grid, speed = self.fleet.speeds, seen(observations, "speed")
         held = np.abs(speed - self._speed) < 0.5 * self.task.trim_step
         self._speed = speed
-        chance = irregular(observations, self.task, self.threshold, self.softness)
+        chance = irregular(observations, self.task, self.threshold, self.softness, self.sure)
         near = np.exp(-0.5 * ((grid - speed[:, None]) / self.task.trim_step) ** 2) * held[:, None]
         self._wild += near * chance[:, None]
         self._calm += near * (1.0 - chance)[:, None]

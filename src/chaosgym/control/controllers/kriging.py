@@ -64,7 +64,7 @@ LOG_COST = (-30.0, 9.0)
 """Logarithms of the least and the largest cost of a step that are distinguished."""
 
 
-class Prior(NamedTuple):
+class KrigingPrior(NamedTuple):
     """One choice of l, s and e: ``covariance`` (s, s) of the speeds by (1), ``error`` e, and its ``log_density``."""
 
     covariance: Array
@@ -180,7 +180,7 @@ def _values(distance: Array, log_price: Array, deviation: Array, far: NDArray[np
     return expected, np.where(far, np.inf, expected - HORIZON * np.where(room > 0.0, np.maximum(saved, 0.0), 0.0))
 
 
-def _priors(grid: Array) -> list[Prior]:
+def _priors(grid: Array) -> list[KrigingPrior]:
     """All choices of l, s and e for the speeds of a grid."""
     u = np.log(grid / grid[0]) if grid[0] > 0.0 else (grid - grid[0]) / (grid[-1] - grid[0])
     smooth = CONSTANT**2 + POWER**2 * u[:, None] * u
@@ -189,18 +189,18 @@ def _priors(grid: Array) -> list[Prior]:
     for chosen in product(LENGTHS, SIZES, ERRORS):
         length, size, error = chosen
         density = -0.5 * np.sum((np.log(np.divide(chosen, MIDDLE)) / WIDTH) ** 2)
-        priors.append(Prior(smooth + size**2 * np.exp(-share / length), error, float(density)))
+        priors.append(KrigingPrior(smooth + size**2 * np.exp(-share / length), error, float(density)))
     return priors
 
 
-def _whitened(prior: Prior, at: Any, felt: Array, counts: Array) -> tuple[Array, Array]:
+def _whitened(prior: KrigingPrior, at: Any, felt: Array, counts: Array) -> tuple[Array, Array]:
     """Cholesky factor of the covariance of the measured values, and its inverse times that."""
     covariance = prior.covariance[np.ix_(at, at)] + np.diag(prior.error**2 / counts)
     factor = np.asarray(np.linalg.cholesky(covariance), float)
     return factor, np.asarray(np.linalg.solve(factor, felt))
 
 
-def _log_posterior(prior: Prior, at: Any, felt: Array, counts: Array) -> float:
+def _log_posterior(prior: KrigingPrior, at: Any, felt: Array, counts: Array) -> float:
     """Logarithm of the posterior density of a choice of l, s and e, but for a constant."""
     factor, whitened = _whitened(prior, at, felt, counts)
     return float(prior.log_density - 0.5 * whitened @ whitened - np.log(np.diag(factor)).sum())

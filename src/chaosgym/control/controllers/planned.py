@@ -263,7 +263,7 @@ class Belief(Controller):
         self._fit -= self.temper * np.where(held[:, None], np.log1p(0.5 * miss**2), 0.0)
         weight = np.exp(self._fit - self._fit.max(axis=1, keepdims=True))
         weight /= weight.sum(axis=1, keepdims=True)
-        self._wild[every, place] += irregular(observations, self.task, THRESHOLD, 0.1) * held
+        self._wild[every, place] += irregular(observations, self.task, THRESHOLD, 0.1, self.sure) * held
         self._visits[every, place] += held
         share = (weight @ self.fleet.share + self._wild) / (1.0 + self._visits)
         damage, grid = weight @ self.fleet.damage(self.task), self.fleet.speeds

@@ -37,7 +37,7 @@ STAYING = 0.02
 """Cost by which another speed must be better than the present one, as a share of an irregular step (assumed)."""
 
 
-class Tables(NamedTuple):
+class LearnedTables(NamedTuple):
     """By speed and class (s, c): ``share`` irregular, ``mean_peak`` [N], and of the readings (s, c, 5) the rest."""
 
     share: Array
@@ -52,7 +52,7 @@ def readings_of(observations: NDArray[Any]) -> Array:
     return np.column_stack([np.log(felt[:, :3] + (1.0, 0.3, 0.3)), felt[:, 3:]])
 
 
-def learned_tables(env: str, *, jobs: int = JOBS, progress: str | None = None, **keywords: Any) -> Tables:
+def learned_tables(env: str, *, jobs: int = JOBS, progress: str | None = None, **keywords: Any) -> LearnedTables:
     """Play machines of an environment at random speeds of its grid, and count; ``keywords`` of the environment."""
     rows = []
     envs = native_envs(env, min(jobs, AT_ONCE), **(keywords | {"action": "speed"}))
@@ -80,7 +80,7 @@ def _played(envs: Any, seed: int) -> tuple[Array, ...]:
     return tuple(np.concatenate(parts) for parts in zip(*kept, strict=True))
 
 
-def _counted(task: Task, place: Any, kind: Any, irregular: Array, felt: Array, peak: Array) -> Tables:
+def _counted(task: Task, place: Any, kind: Any, irregular: Array, felt: Array, peak: Array) -> LearnedTables:
     from scipy.ndimage import gaussian_filter
 
     def total(values: Array) -> Array:
@@ -93,7 +93,7 @@ def _counted(task: Task, place: Any, kind: Any, irregular: Array, felt: Array, p
     mean = np.stack([total(column) / known for column in felt.T], axis=-1)
     squares = np.stack([total(column**2) / known for column in felt.T], axis=-1)
     deviation = np.sqrt(np.maximum(squares - mean**2, 0.0)) + FLOORS
-    return Tables((total(irregular) + 0.02) / (count + 0.1), total(peak) / known, mean, deviation)
+    return LearnedTables((total(irregular) + 0.02) / (count + 0.1), total(peak) / known, mean, deviation)
 
 
 class Table(Controller):
@@ -107,7 +107,7 @@ class Table(Controller):
 
     knows = "tolerances"
 
-    def __init__(self, tables: Tables) -> None:
+    def __init__(self, tables: LearnedTables) -> None:
         super().__init__()
         self.tables = tables
 

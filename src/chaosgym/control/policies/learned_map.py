@@ -69,6 +69,15 @@ class FeltSpeeds:
         self._last, self._jobs = np.full(count, np.nan), np.arange(count)
         self.settled = np.zeros(count, np.bool_)
 
+    @property
+    def memory(self) -> NDArray[np.float32]:
+        """What is remembered of each speed, (N, speeds, 7)."""
+        return self._felt.copy()
+
+    @memory.setter
+    def memory(self, values: NDArray[np.float32]) -> None:
+        self._felt[:] = values
+
     def unusual(self, observations: Observations) -> Array:
         """How far the readings lie from what is usual at their speed, in standard deviations, (N, 5)."""
         place = place_of(seen(observations, "speed"), self.task)
@@ -124,6 +133,8 @@ class LearnedMap(Controller):
         ``definition`` of the machine that it was trained on; by default the name in the environment's id.
     cycles_per_step
         Cycles of the steps that it learned from; 0 for those of the machine's own task.
+    least_gain
+        Expected gain of a step for which it leaves the demand.
 
     Raises
     ------
@@ -144,6 +155,7 @@ class LearnedMap(Controller):
     deviation: Array
     machine: str = ""
     cycles_per_step: int = 0
+    least_gain: float = 0.0
     knows: str = "measurements"
     _felt: FeltSpeeds = field(init=False, repr=False)
 
@@ -179,18 +191,48 @@ class LearnedMap(Controller):
         warn_of_other_steps(self.cycles_per_step, envs)
         self._felt = FeltSpeeds(self.task, self.count, self.mean, self.deviation)
 
+    @property
+    def settled(self) -> NDArray[np.bool_]:
+        """Whether the last step held the speed of the one before, of each job."""
+        return self._felt.settled
+
+    @property
+    def memory(self) -> NDArray[np.float32]:
+        """What was felt at each speed in the jobs that were started, (N, speeds, 7).
+
+        Set it after a start to go on from an earlier job of the same machines, whose clearances are as they were then.
+        """
+        return self._felt.memory
+
+    @memory.setter
+    def memory(self, values: NDArray[np.float32]) -> None:
+        if np.shape(values) != self._felt.memory.shape or not np.isfinite(values).all():
+            raise ModelFileError(
+                f"a memory of shape {np.shape(values)} is none of this policy; expected: {self._felt.memory.shape}, "
+                "all finite"
+            )
+        self._felt.memory = values
+
     def unusual(self, observations: Observations) -> Array:
         """How far the readings lie from what was usual in training, in standard deviations, (n, 5)."""
         return self._felt.unusual(observations)
 
+    def predicted(self, observations: Observations) -> tuple[Array, Array]:
+        """Share of irregular cycles and mean peak [N] at each speed, (N, speeds) each, by all that was felt."""
+        answer, _ = self.network(self._felt.add(observations), None)
+        share, peak = np.split(answer.astype(float), 2, axis=1)
+        return 0.5 + 0.5 * np.tanh(0.5 * share), np.exp(peak.clip(-10.0, 20.0))
+
     def speeds(self, observations: Observations) -> Array:
         """The speed of least expected cost."""
         task, grid = self.task, self.task.grid
-        answer, _ = self.network(self._felt.add(observations), None)
-        share = 0.5 + 0.5 * np.tanh(0.5 * answer[:, : len(grid)].astype(float))
-        peak = np.exp(answer[:, len(grid) :].astype(float).clip(-10.0, 20.0))
+        share, peak = self.predicted(observations)
         lost = damage_in_a_million(peak, task.reference_force) * task.reference_damage / task.steps
         demand = seen(observations, "demand")
         cost = self.cost(share, lost, demand, grid)
         cost[np.abs(grid - demand[:, None]) > task.largest_trim + 0.5 * task.trim_step] = np.inf
-        return np.asarray(grid[cost.argmin(axis=1)])
+        best, least = grid[cost.argmin(axis=1)], cost.min(axis=1)
+        if self.least_gain == 0.0:
+            return np.asarray(best)
+        here = cost[np.arange(self.count), place_of(demand, task)]
+        return np.where(least < here - self.least_gain, best, demand)

@@ -144,14 +144,29 @@ class TrainedPolicy:
         ModelFileError
             If it is of another machine, has another kind of actions, or sees what the environment does not give.
         """
-        here = envs.nominal.definition
-        if here != self.machine or envs.task.action != self.action:
+        self.check_machine(envs)
+        if envs.task.action != self.action:
             raise ModelFileError(
-                f"the policy was trained on {self.env} (machine {self.machine}) with action={self.action!r}; "
-                f"this is {envs.nominal.name} (machine {here}) with action={envs.task.action!r}"
+                f"the policy was trained on {self.env} with action={self.action!r}; this is {envs.nominal.name} with "
+                f"action={envs.task.action!r}"
             )
         warn_of_other_steps(self.cycles_per_step, envs)
         self.begin(envs.task, envs.num_envs)
+
+    def check_machine(self, envs: Any) -> None:
+        """Refuse environments of another machine than that of the training.
+
+        Raises
+        ------
+        ModelFileError
+            If it is another.
+        """
+        here = envs.nominal.definition
+        if here != self.machine:
+            raise ModelFileError(
+                f"the policy was trained on {self.env} (machine {self.machine}); this is {envs.nominal.name} "
+                f"(machine {here})"
+            )
 
     def begin(self, task: Task, count: int) -> None:
         """Begin ``count`` jobs of a task side by side.
@@ -223,7 +238,8 @@ MAP = "map"
 
 
 def save_policy(policy: "TrainedPolicy | LearnedMap", folder: str | Path) -> None:
-    """Write ``policy.json`` and ``weights.npz`` into a folder that exists; the same policy gives the same bytes."""
+    """Write ``policy.json`` and ``weights.npz`` into a folder, made if need be; a policy gives the same bytes."""
+    Path(folder).mkdir(parents=True, exist_ok=True)
     network = policy.network
     arrays: dict[str, Array] = {}
     if network.lstm:

@@ -13,6 +13,11 @@ from chaosgym.envs import environment
 from chaosgym.errors import ModelFileError
 
 
+def _folders() -> Path:
+    """Where the folders of all of them are."""
+    return Path(str(resources.files("chaosgym.control.policies"))) / "shipped"
+
+
 def shipped_name(env: str, level: str | None = None) -> str:
     """Name of what is shipped for an environment id at a level; None for the id's own.
 
@@ -28,7 +33,7 @@ def shipped_name(env: str, level: str | None = None) -> str:
 
 def shipped_folder(env: str, level: str | None = None) -> Path:
     """Return the folder of the shipped policy of an environment id, whether it exists or not."""
-    return Path(str(resources.files("chaosgym.control.policies"))) / "shipped" / shipped_name(env, level)
+    return _folders() / shipped_name(env, level)
 
 
 def shipped_policy(env: str, level: str | None = None) -> TrainedPolicy | LearnedMap:
@@ -41,10 +46,19 @@ def shipped_policy(env: str, level: str | None = None) -> TrainedPolicy | Learne
     """
     folder = shipped_folder(env, level)
     if not folder.is_dir():
-        known = sorted(path.name for path in folder.parent.glob("*/"))
+        known = sorted(path.name for path in _folders().glob("*/"))
         raise ModelFileError(
             f"no policy is shipped for {env}{f', level {level}' if level else ''}; "
             f"shipped: {', '.join(known) or 'none'}. "
             "Train one with agents/ppo.py and give its folder with --policy"
         )
     return load_policy(folder)
+
+
+def map_of_the_fleet(machine: str) -> LearnedMap | None:
+    """Return the learned map that is shipped for the fleet of a machine, by its ``definition``; None without one."""
+    for folder in sorted(_folders().glob("*-fleet")):
+        policy = load_policy(folder)
+        if isinstance(policy, LearnedMap) and policy.machine == machine:
+            return policy
+    return None

@@ -113,7 +113,7 @@ def taylor_model_of(batch, i):
         batch.gap[i],
         batch.stiffness[i],
         batch.damping[i],
-        batch.law[i],
+        batch.exponent[i],
         batch.slides[i],
         batch.two_sided[i],
         batch.reading[i],
@@ -134,4 +134,5 @@ def advance_taylor_machines(batch, which, motions, arrays, settings, outcome):
             rows_of(arrays, k),
             settings.event_tolerance / batch.contact_rate[i],
             settings.event_budget,
+            no_tangents(motions.coordinates.shape[1], 0),
         )[0]

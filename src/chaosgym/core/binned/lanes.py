@@ -93,6 +93,17 @@ def add_rows(e, own, at, factor, sum_at, width):
 
 
 @operation()
+def add_sums(e, own, at, width, count, factors_at, factor, sum_at):
+    """Add ``factor`` times the sum over c < ``count`` of factor c times row c to a part of an array, all (width,)."""
+    b = e.builder
+    with e.vectors(width) as loop:
+        first = e.times(loop.index, LANES)
+        (answer,) = sums_of_columns(e, own, [b.add(at, first)], width, (count, None, None), own, factors_at)
+        total = b.add(sum_at, first)
+        e.store(e.fma(e.spread(factor), answer, e.load(own, total)), own, total)
+
+
+@operation()
 def copy(e, own, at, out_at, count):
     """Copy numbers within an array without overlap; unlike numba's indexing it tests no sign of the index."""
     b = e.builder

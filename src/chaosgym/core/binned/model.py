@@ -7,8 +7,8 @@ import numpy as np
 FORCING_TERMS = 4
 """Coefficients of the forcing polynomial: a cubic."""
 
-LINEAR, HERTZ = 0, 1
-"""Laws of contact."""
+LINEAR, HERTZ = 0.0, 1.5
+"""Exponents of the penetration: of Hertz's law, and what stands for a linear spring and damper."""
 
 
 class BinnedModel(NamedTuple):
@@ -88,19 +88,19 @@ class TaylorModel(NamedTuple):
         Last terms of the series of velocities at the end of a span [m/s].
     contact_rate : float
         Angular frequency of the masses next to the closed contacts [rad/s].
-    acceleration : (bins, 2n + 4 + R + 1, lanes)
+    acceleration : (bins, 2n + 4 + R + S, lanes)
         Second derivative per unit (p, p', 1, x, x^2, x^3), x being the time in the bin over its duration, per newton
-        on the surface along each row, and per newton that slides.
+        on the surface along each row, and per newton of each of S frictions.
     first : (J + 1,) int
         Joint j owns the rows first[j] to first[j + 1] - 1.
     row : (R, n)
         Displacement in each direction of a joint per unit coordinate.
     gap, stiffness, damping : (J,)
-        Clearance [m]; k [N/m] and d [N s/m], or K [N/m^1.5] and chi [s/m].
-    law : int
-        LINEAR or HERTZ.
-    slides : (J,)
-        Share of a joint's force that has friction.
+        Clearance [m]; k [N/m] and d [N s/m], or K [N/m^n] and chi [s/m].
+    exponent : (J,)
+        LINEAR, or n of the penetration.
+    slides : (J,) int
+        Friction of a joint's force among the S, or -1.
     two_sided : (J,) bool
         False if a joint with one row has a surface only where row . p is positive.
     reading : (R, 3)
@@ -122,7 +122,7 @@ class TaylorModel(NamedTuple):
     gap: np.ndarray
     stiffness: np.ndarray
     damping: np.ndarray
-    law: int
+    exponent: np.ndarray
     slides: np.ndarray
     two_sided: np.ndarray
     reading: np.ndarray

@@ -21,6 +21,14 @@ from chaosgym.core.binned.record import (
     write_peaks,
     write_sample,
 )
+from chaosgym.core.binned.taylor_deviations import (
+    expand_deviations,
+    jump_at_touch,
+    move_deviations,
+    new_deviations,
+    put_deviations,
+    take_deviations,
+)
 from chaosgym.core.binned.taylor_series import ORDER, begin, expand, new_series, span
 from chaosgym.core.binned.taylor_view import (
     CHANGE,
@@ -39,6 +47,7 @@ from chaosgym.core.cycle import LOWER, UPPER
 from chaosgym.core.events import cubic, cubic_extremum, let_pass, note_touch
 from chaosgym.core.kernel import leaf, njit, part
 from chaosgym.core.lanes import padded
+from chaosgym.core.tangent import orthonormalise
 
 POLISH = 50
 """Instants tried to locate one event; the secant method needs three to six."""
@@ -227,10 +236,11 @@ def take_sample(model, series, time, closed, view, z, sample):
 
 
 @leaf
-def turn(model, closed, series, views, whole, z, peak, bouncing, arrays, cycle, tolerance, budget):
+def turn(model, closed, series, views, whole, z, peak, bouncing, arrays, cycle, tolerance, budget, deviations):
     """Advance a revolution from the beginning of a series; its events, or a negative status.
 
     ``views`` are three of the readings; ``whole`` is one of all lanes, left at the end. z (2n,) is work space.
+    ``deviations`` travel along from the first two terms of their series.
     """
     before, after, between = views
     bins, duration = model.acceleration.shape[0], model.bin_duration
@@ -278,18 +288,24 @@ def turn(model, closed, series, views, whole, z, peak, bouncing, arrays, cycle, 
                 before, after = after, before
                 start = end
             time += reached
+            if deviations.width > 0:
+                expand_deviations(model, b, closed, series, deviations)
+                move_deviations(model, reached, deviations)
             read(series, reached, whole)
             for i in range(series.lanes.shape[1]):
                 series.lanes[0, i], series.lanes[1, i] = whole.lanes[0, i], whole.lanes[1, i]
             if found:
                 events += change_contacts(model, closed, before, bouncing, origin + time, impacts, bounce_time)
+                for j in range(closed.shape[0]):
+                    if deviations.width > 0 and closed[j] and before.joint[j, MARGIN] <= 0.0:
+                        jump_at_touch(model, b, j, before, deviations)
                 if events > budget:
                     return -status.EVENT_BUDGET
     return events
 
 
 @njit(cache=True, nogil=True)
-def advance(model, state, bouncing, arrays, event_tolerance, event_budget):
+def advance(model, state, bouncing, arrays, event_tolerance, event_budget, tangents):
     """Advance ``state`` (2n,) and ``bouncing`` in place by whole revolutions; see ``cycle.advance``."""
     bins, _, lanes = model.acceleration.shape
     if model.steps * bins > STEP_BUDGET:
@@ -299,13 +315,27 @@ def advance(model, state, bouncing, arrays, event_tolerance, event_budget):
     series, whole = new_series(model), new_view(model, lanes)
     views = (new_view(model, readings), new_view(model, readings), new_view(model, readings))
     z, closed, peak = np.empty(state.shape[0]), np.zeros(model.gap.shape[0], dtype=np.bool_), np.zeros((2, 5))
+    deviations, metric = new_deviations(model, tangents.vectors.shape[0]), np.full(len(z) // 2, model.contact_rate**2)
     for cycle in range(arrays.section.shape[0]):
         begin_cycle(model, state, arrays, cycle)
         peak[:] = 0.0
         begin(model, state, series)
+        put_deviations(model, tangents.vectors, deviations)
         judge(model, series, closed, views[0])
         events = turn(
-            model, closed, series, views, whole, z, peak, bouncing, arrays, cycle, event_tolerance, event_budget
+            model,
+            closed,
+            series,
+            views,
+            whole,
+            z,
+            peak,
+            bouncing,
+            arrays,
+            cycle,
+            event_tolerance,
+            event_budget,
+            deviations,
         )
         if events < 0:
             return -events, cycle
@@ -315,5 +345,9 @@ def advance(model, state, bouncing, arrays, event_tolerance, event_budget):
         for i in range(state.shape[0]):
             if not abs(state[i]) < RUNAWAY:
                 return status.DIVERGED, cycle
+        take_deviations(model, deviations, tangents.vectors)
+        if tangents.log_growth.shape[1] > 0:
+            tangents.log_growth[cycle] = 0.0
+            orthonormalise(metric, tangents, cycle)
         let_pass(bouncing, 1, period)
     return status.OK, arrays.section.shape[0]

@@ -16,7 +16,7 @@ import numpy as np
 from numba.extending import register_jitable
 
 from chaosgym.core.binned.lanes import next_term
-from chaosgym.core.binned.model import FORCING_TERMS, LINEAR
+from chaosgym.core.binned.model import FORCING_TERMS, HERTZ, LINEAR
 from chaosgym.core.binned.series import SHARES, shift_forcing
 from chaosgym.core.kernel import leaf, part
 from chaosgym.core.lanes import LANES, add_columns
@@ -32,8 +32,8 @@ class Series(NamedTuple):
     """Taylor coefficients of a motion, in seconds.
 
     ``lanes`` (ORDER + 1, lanes) of readings and coordinates; (J, ORDER + 1) of each closed joint: ``distance`` |e|,
-    ``power`` x^(3/2), ``force`` N and ``weight`` N / |e|. ``side`` (J,) is the sign of e where the force does not turn,
-    else 0; ``factors`` (4 + R + 1,) of the columns of ``acceleration`` after those of the state; ``powers`` (4,) of x.
+    ``power`` x^n, ``force`` N and ``weight`` N / |e|. ``side`` (J,) is the sign of e where the force does not turn,
+    else 0; ``factors`` (4 + R + S,) of the columns of ``acceleration`` after those of the state; ``powers`` (4,) of x.
     """
 
     lanes: np.ndarray
@@ -49,10 +49,10 @@ class Series(NamedTuple):
 @register_jitable
 def new_series(model):
     """Return a series that begins at rest."""
-    joints, rows = model.gap.shape[0], model.row.shape[0]
+    joints, columns = model.gap.shape[0], model.acceleration.shape[1] - 2 * model.row.shape[1]
     lanes = np.zeros((ORDER + 1, model.acceleration.shape[2]))
     distance, power, force, weight = np.zeros((4, joints, ORDER + 1))
-    factors, powers = np.zeros(FORCING_TERMS + rows + 1), np.ones(FORCING_TERMS)
+    factors, powers = np.zeros(columns), np.ones(FORCING_TERMS)
     return Series(lanes, distance, power, force, weight, np.zeros(joints), factors, powers)
 
 
@@ -121,22 +121,31 @@ def begin_joint(model, j, series):
         series.distance[j, 0] = series.side[j] * series.lanes[0, low]
 
 
+@leaf
+def root_of(depth, exponent):
+    """Penetration to the power of an exponent less one; called, since it is rare and would spoil its callers."""
+    if exponent == HERTZ:
+        return math.sqrt(depth)
+    return depth ** (exponent - 1.0)
+
+
 @part
 def extend_force(model, j, k, series):
     """Write coefficient k of the force (1) or (2) of a closed joint; its distance is known one order further."""
     distance, force, power = series.distance[j], series.force[j], series.power[j]
     stiffness, damping = model.stiffness[j], model.damping[j]
     depth = distance[0] - model.gap[j]
-    if model.law == LINEAR:
+    exponent = model.exponent[j]
+    if exponent == LINEAR:
         force[k] = stiffness * (depth if k == 0 else distance[k]) + damping * (k + 1.0) * distance[k + 1]
         return
     depth = max(depth, LEAST_DEPTH)
     if k == 0:
-        power[0] = depth * math.sqrt(depth)
+        power[0] = depth * root_of(depth, exponent)
     else:
         total = 0.0
         for i in range(1, k + 1):
-            total += (2.5 * i - k) * distance[i] * power[k - i]
+            total += ((exponent + 1.0) * i - k) * distance[i] * power[k - i]
         power[k] = total / (k * depth)
     total = power[k]
     for i in range(k + 1):
@@ -152,7 +161,8 @@ def extend_joint(model, j, k, series):
     extend_force(model, j, k, series)
     distance, force, weight = series.distance[j], series.force[j], series.weight[j]
     along = series.factors[FORCING_TERMS:]
-    along[model.row.shape[0]] += model.slides[j] * force[k]
+    if model.slides[j] >= 0:
+        along[model.row.shape[0] + model.slides[j]] += force[k]
     if series.side[j] != 0.0:
         along[low] = series.side[j] * force[k]
         return
@@ -179,7 +189,8 @@ def expand(model, b, time, closed, last, series):
         skipped = min(k, FORCING_TERMS)
         shift_forcing(series.powers, 0, k, scale, factors, 0)
         scale /= model.bin_duration
-        factors[FORCING_TERMS + rows] = 0.0
+        for i in range(FORCING_TERMS + rows, factors.shape[0]):
+            factors[i] = 0.0
         for j in range(closed.shape[0]):
             if closed[j]:
                 extend_joint(model, j, k, series)

@@ -3,7 +3,7 @@
 Joint j reads e = (row_1 . p, row_2 . p, ...) and pushes along e / |e| with a force N of penetration x = |e| - c:
 
     (1)  linear                     N = k x + d x'
-    (2)  Hertz with dissipation     N = K x^(3/2) (1 + chi x')          (Hunt and Crossley, 1975)
+    (2)  Hertz with dissipation     N = K x^n (1 + chi x'), n = 3/2     (Hunt and Crossley, 1975)
 
 as long as x and N are positive.
 """
@@ -17,7 +17,7 @@ from numba.extending import register_jitable
 from chaosgym.core.binned.lanes import sum_series
 from chaosgym.core.binned.model import LINEAR
 from chaosgym.core.binned.record import resultant
-from chaosgym.core.binned.taylor_series import ORDER
+from chaosgym.core.binned.taylor_series import ORDER, root_of
 from chaosgym.core.kernel import part
 
 DEPTH, RATE, MARGIN, FORCE, CHANGE = range(5)
@@ -69,7 +69,7 @@ def measure(model, j, view):
 @part
 def margin(model, j, closed, depth, rate):
     """What is positive as long as joint j keeps its contact state; its sign is that of the force, or of the gap."""
-    if model.law == LINEAR:
+    if model.exponent[j] == LINEAR:
         force = depth + model.damping[j] / model.stiffness[j] * rate
     else:
         force = depth * (1.0 + model.damping[j] * rate)
@@ -84,10 +84,11 @@ def push(model, j, view):
     for r in range(model.first[j], model.first[j + 1]):
         bend += view.direction[r] * view.lanes[2, r]
     stiffness, damping = model.stiffness[j], model.damping[j]
-    if model.law == LINEAR:
+    exponent = model.exponent[j]
+    if exponent == LINEAR:
         return stiffness * depth + damping * rate, stiffness * rate + damping * bend
-    root = math.sqrt(abs(depth))
-    growth = 1.5 * rate * (1.0 + damping * rate) + max(depth, 0.0) * damping * bend
+    root = root_of(abs(depth), exponent)
+    growth = exponent * rate * (1.0 + damping * rate) + max(depth, 0.0) * damping * bend
     return stiffness * depth * root * (1.0 + damping * rate), stiffness * root * growth
 
 

@@ -85,7 +85,7 @@ from chaosgym.core.joints.tables import (
     TO,
     WIDTH,
 )
-from chaosgym.core.kernel import entry, leaf, part
+from chaosgym.core.kernel import leaf, part
 from chaosgym.core.lanes import LANES, add_columns, item, propagate, propagate_and_expand, put
 from chaosgym.core.tangent import MAX_CONTRACTION, orthonormalise
 
@@ -264,7 +264,7 @@ def room_for(at, bouncing, tangents):
     return np.empty(bouncing.size + tangents.vectors.size + tangents.vectors.shape[0] * 2 * at[WIDTH])
 
 
-@entry
+@leaf
 def advance_joints(run, rows, weights, state, bouncing, arrays, event_budget, tangents, kept, rubs):
     """Advance ``state`` (2n + f,) and ``bouncing`` (3m,) in place by whole cycles, one for each row of ``arrays``.
 

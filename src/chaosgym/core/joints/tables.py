@@ -25,6 +25,7 @@ import numpy as np
 
 from chaosgym.core.kernel import leaf, njit, part
 from chaosgym.core.lanes import LANES, padded
+from chaosgym.core.linear_algebra import times
 from chaosgym.core.propagator import block, bound, derivative, steady_response
 
 MOST_LEVELS = 16
@@ -131,17 +132,6 @@ def layout(n, harmonics, m, sliders, levels):
     return at
 
 
-@njit(cache=True)
-def _shown(shape, from_modal):
-    """Rows of (2): displacement of what has a ``shape`` (k, n), each after the other, per modal coordinate (k, 2n)."""
-    shown = np.empty((shape.shape[0], from_modal.shape[1]))
-    for j in range(shape.shape[0]):
-        row = shape[j] @ from_modal[: shape.shape[1]]
-        for i in range(row.size):
-            shown[j, i] = row[i]
-    return shown
-
-
 @part
 def put_structure(at, generator, to_modal, from_modal, shape, lag, shortest, rest, drift, constants, rubs, values):
     """Fill a row (at[ROW],) of zeros with what depends on neither drive nor constant force.
@@ -183,23 +173,23 @@ def put_structure(at, generator, to_modal, from_modal, shape, lag, shortest, res
             values[LONGEST] -= 1.0
         growth *= math.ldexp(longest, int(values[LONGEST]))
     _put_blocks(at, generator, shortest, np.int64(0), at[LEVELS], values)
-    shown = strain = _shown(shape, from_modal)
+    shown = strain = times(shape, from_modal)
     if rubs is not None:
-        strain = _shown(rubs.shape, from_modal)
+        strain = times(rubs.shape, from_modal)
     _put_channels(at, generator, shown, lag, strain, rubs, np.int64(0), at[LEVELS], math.exp(growth), values)
     if rubs is not None and sliders > 0:
         anchors = np.zeros((4, sliders))
         for c in range(sliders):
             anchors[1, c] = 1.0
         _put_blocks(at, anchors, shortest, n + harmonics, at[LEVELS], values)
-        back = from_modal @ rubs.follow
-        shown, strain = shape @ back[:n], rubs.shape @ back[:n]
+        back = times(from_modal, rubs.follow)
+        shown, strain = times(shape, back), times(rubs.shape, back)
         for c in range(sliders):
             strain[c, c] -= 1.0
         _put_channels(at, anchors, shown, lag, strain, rubs, n + harmonics, at[LEVELS], 1.0, values)
         for c in range(2 * sliders):
             _put_forced(at, back[:, c], rubs.follow[:, c], c, sliders, harmonics, 2 * harmonics, values)
-    resting = from_modal @ np.ascontiguousarray(rest.T)
+    resting = times(from_modal, np.ascontiguousarray(rest.T))
     for i in range(2 * n):
         for c in range(2 * n):
             values[at[FROM] + ((c // n) * width + c % n) * states + i] = from_modal[i, c]
@@ -238,7 +228,7 @@ def put_drive(at, generator, to_modal, from_modal, shape, lag, omega, drive, res
         for i in range(2 * n):
             steady[i, h], steady[i, harmonics + h] = response[i, 0], response[i, 1]
     _put_blocks(at, turning, shortest, n, levels, values)
-    back = from_modal @ steady
+    back = times(from_modal, steady)
     resting, settling, drifting = np.zeros(2 * n), np.zeros(2 * n), np.zeros(2 * n)
     values[DRIFTING] = values[ALWAYS_DRIFTING]
     for i in range(2 * n):
@@ -262,10 +252,7 @@ def put_drive(at, generator, to_modal, from_modal, shape, lag, omega, drive, res
         for i in range(n):
             values[at[CONSTANTS] + j * (1 + at[JOINTS])] += shape[j, i] * resting[i]
     if rubs is not None:
-        for s in range(at[SLIDERS]):
-            row = rubs.shape[s] @ back[:n]
-            for c in range(2 * harmonics):
-                strain[s, c] = row[c]
+        strain = times(rubs.shape, back)
     _put_channels(at, turning, shown, lag, strain, rubs, n, levels, 1.0, values)
     if rubs is not None:
         for k in range(2 * at[SLIDERS]):
@@ -303,9 +290,9 @@ def read_at_rest(generator, from_modal, shape, lag, rubs, k, reading, strain, dr
 
     Modal coordinates ``drift`` (2n,) at these rates, which shows as a constant in what has a velocity in it.
     """
-    n, j, after = shape.shape[1], int(rubs.joint[k // 2]), np.empty(from_modal.shape[0])
+    j, after = int(rubs.joint[k // 2]), np.empty(from_modal.shape[0])
     alpha, beta = rubs.weight[k, 0], rubs.weight[k, 1]
-    moved, slid = shape[j] @ from_modal[:n], rubs.shape[k // 2] @ from_modal[:n]
+    moved, slid = times(shape[j : j + 1], from_modal)[0], times(rubs.shape[k // 2 : k // 2 + 1], from_modal)[0]
     if rubs.rate[k] == 0.0:
         return alpha * (reading + lag[j] * np.sum(moved * drift)) + beta * strain
     derivative(generator, moved, after)

@@ -45,7 +45,7 @@ INFO = (REPORT.names or ())[: -len(MOTOR)]
 """Info of a step at a constant speed."""
 
 
-class Places(NamedTuple):
+class BaseEntries(NamedTuple):
     """Column of each entry that every observation has; entries that a keyword adds follow (``envs.entries``)."""
 
     speed: int
@@ -64,7 +64,7 @@ class Places(NamedTuple):
     bouncing_share: int
 
 
-PLACE = Places(*range(len(Places._fields)))
+PLACE = BaseEntries(*range(len(BaseEntries._fields)))
 """Columns of the entries, by name."""
 
 REPEATS = ((PLACE.repeat_1, 1), (PLACE.repeat_2, 2), (PLACE.repeat_4, 4))

@@ -10,7 +10,9 @@ from typing import NamedTuple
 import numpy as np
 
 from chaosgym.arrays import Array
-from chaosgym.core.binned.model import FORCING_TERMS
+from chaosgym.core import matrices
+from chaosgym.core.binned.model import FORCING_TERMS, LINEAR
+from chaosgym.core.matrices import product
 from chaosgym.errors import ParameterError
 from chaosgym.machines.parameters import refuse_not_finite
 
@@ -29,17 +31,17 @@ class Contact(NamedTuple):
     row : (R, n)
         Displacement in each direction per unit coordinate.
     gap, stiffness, damping
-        Clearance [m]; k [N/m] and d [N s/m], or K [N/m^1.5] and chi [s/m] of Hertz's law.
+        Clearance [m]; k [N/m] and d [N s/m], or K [N/m^n] and chi [s/m] of a Hertzian surface.
     two_sided
         False if a contact with one row has a surface only where row . p is positive.
     reading : (R, 3)
         Recorded force (along, upward or across, sideways) per newton along each row; zero of another joint.
     slides
-        Whether friction acts along the guide.
-    drag : (n,) or None
-        What friction drives per newton of contact force, on surfaces that slide past steadily.
+        Its friction among those of ``Held``, or -1.
     share : (bins,) or None
         Factor of stiffness and damping over the cycle.
+    exponent
+        n of a Hertzian surface, or LINEAR.
     """
 
     row: Array
@@ -48,9 +50,9 @@ class Contact(NamedTuple):
     damping: float
     two_sided: bool
     reading: Array
-    slides: bool = False
-    drag: Array | None = None
+    slides: int = -1
     share: Array | None = None
+    exponent: float = LINEAR
 
 
 class Held(NamedTuple):
@@ -63,9 +65,9 @@ class Held(NamedTuple):
         Per unit of coordinates and velocities.
     forcing : (powers, bins, 4, n)
         Of the forcing, a cubic in the time of a bin, by powers 0 and 2, or 0, 1 and 2.
-    friction : (bins, n)
-        What one newton of contact force drives along the guide.
-    tangent : (bins,)
+    friction : (S, bins, n)
+        What one newton of contact force drives by each friction.
+    tangent : (S, bins)
         Of the angle by which friction of a pin turns its contact force.
     """
 
@@ -92,20 +94,20 @@ def held(
         (bins, n, n), (2, bins, n, n) and (3, bins, n, n) at the middles of the bins, by powers of the rate.
     loads : (powers, 3 bins, n)
         At the nodes of the forcing, three a bin from the beginning of the first on.
-    friction, tangent : (bins, n), (bins,)
+    friction, tangent : (S, bins, n), (S, bins)
         As in ``Held``; none if omitted.
     """
     bins, n = mass.shape[:2]
-    inverse_mass = np.asarray(np.linalg.inv(mass), dtype=np.float64)
+    inverse_mass = np.asarray(matrices.inv(mass), dtype=np.float64)
     free = np.zeros((3, bins, 2 * n, n))
-    free[:, :, :n] = -np.swapaxes(inverse_mass @ stiffness, -1, -2)
-    free[:2, :, n:] = -np.swapaxes(inverse_mass @ damping, -1, -2)
+    free[:, :, :n] = -np.swapaxes(product(inverse_mass, stiffness), -1, -2)
+    free[:2, :, n:] = -np.swapaxes(product(inverse_mass, damping), -1, -2)
     found = Held(
         inverse_mass,
         free,
         _forcing(inverse_mass, loads),
-        np.zeros((bins, n)) if friction is None else friction,
-        np.zeros(bins) if tangent is None else tangent,
+        friction := np.zeros((0, bins, n)) if friction is None else friction,
+        np.zeros(friction.shape[:2]) if tangent is None else tangent,
     )
     refuse_not_finite("the equations of a mechanism", *found)
     return found
@@ -117,7 +119,7 @@ def largest_rate(accelerations: Array) -> float:
     system = np.zeros((len(accelerations), 2 * n, 2 * n))
     system[:, n:, :n] = np.eye(n)
     system[:, :, n:] = accelerations
-    return float(np.max(np.abs(np.linalg.eigvals(system))))
+    return float(np.max(matrices.modulus(matrices.eigvals(system))))
 
 
 def middles_and_nodes(bins: int) -> tuple[Array, Array]:
@@ -132,8 +134,8 @@ def _forcing(inverse_mass: Array, loads: Array) -> Array:
     """Cubics in the time of each bin through the loads at its nodes, as accelerations: (2, bins, 4, n)."""
     bins, nodes = len(inverse_mass), FORCING_TERMS - 1
     at = (np.arange(bins)[:, None] * nodes + np.arange(FORCING_TERMS)) % (bins * nodes)
-    coefficients = np.linalg.inv(np.vander(np.arange(FORCING_TERMS) / nodes, increasing=True))
-    return np.asarray(-np.einsum("bij,kbcj->kbci", inverse_mass, coefficients @ loads[:, at]))
+    coefficients = matrices.inv(np.vander(np.arange(FORCING_TERMS) / nodes, increasing=True))
+    return np.asarray(-np.einsum("bij,kbcj->kbci", inverse_mass, product(coefficients, loads[:, at])))
 
 
 def even_powers(forcing: Array, rate: float) -> Array:

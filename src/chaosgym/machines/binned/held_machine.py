@@ -3,14 +3,16 @@
 import math
 from abc import abstractmethod
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, fields
+from functools import cache, lru_cache
 from typing import TYPE_CHECKING, Any, ClassVar
 
 import numpy as np
 
 from chaosgym.arrays import Array
-from chaosgym.core.binned.model import LINEAR, BinnedModel, TaylorModel
+from chaosgym.core.binned.model import BinnedModel, TaylorModel
 from chaosgym.errors import ParameterError
+from chaosgym.machines.abilities import Kinematics
 from chaosgym.machines.binned.equations import STEP_PHASE, Contact, Held
 from chaosgym.machines.machine import Machine
 from chaosgym.machines.parameters import parameters_of
@@ -66,25 +68,18 @@ class HeldMachine(Machine):
         """Stiffness [N/m] that the fastest contact may have."""
 
     @property
-    def law(self) -> int:
-        """Law of all contacts, one of ``core.binned.model``."""
-        return LINEAR
-
-    @property
     def gaps(self) -> Array:
         """Clearances [m] of the contacts."""
         return np.array([contact.gap for contact in self.contacts])
 
     @property
-    def stop_rows(self) -> list[tuple[Array, float]]:
-        """Displacement (n,) of each contact per unit coordinate, and its gap [m]."""
-        return [(row, contact.gap) for contact in self.contacts for row in contact.row]
-
-    @property
-    def unit_knocks(self) -> list[Array]:
-        """Change of the velocities (n,) that changes that of the monitored joint by 1, by an impulse at angle 0."""
-        impulse = self.held().inverse_mass[0] @ self.display
-        return [impulse / float(self.display @ impulse)]
+    def kinematics(self) -> Kinematics:
+        """How the monitored joint and the contacts move, and the inverse of the mass matrix at angle 0."""
+        return Kinematics(
+            mobility=np.asarray(kept_held(structure_of(self)).inverse_mass[0]),
+            places={"the joint": self.display},
+            stops=[(row, contact.gap) for contact in self.contacts for row in contact.row],
+        )
 
     @property
     def radix(self) -> int:
@@ -129,3 +124,23 @@ class HeldMachine(Machine):
     @abstractmethod
     def reduce(self, step_phase: float = STEP_PHASE) -> BinnedModel | TaylorModel:
         """Return the model that the kernels integrate; see ``BinnedMachine.reduce``."""
+
+
+KEPT = 128
+"""Machines whose assembled equations are kept, whatever their speed and clearance."""
+
+
+def structure_of(machine: HeldMachine) -> HeldMachine:
+    """The machine at the default speed and clearances, by which is kept what all machines of its matrices share."""
+    return machine._with_unchecked(**_beside(type(machine)))
+
+
+@cache
+def _beside(kind: Any) -> dict[str, Any]:
+    return {field.name: field.default for field in fields(kind) if field.name in kind.beside_matrices}
+
+
+@lru_cache(maxsize=KEPT)
+def kept_held(structure: HeldMachine) -> Held:
+    """What is held, kept for machines without a table of propagators."""
+    return structure.held()

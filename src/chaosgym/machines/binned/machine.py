@@ -4,8 +4,9 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
 from chaosgym.arrays import Array
-from chaosgym.core.binned.model import BinnedModel, TaylorModel
+from chaosgym.core.binned.model import LINEAR, BinnedModel, TaylorModel
 from chaosgym.core.cycle import CycleArrays, cycle_arrays
+from chaosgym.machines.abilities import Propagation
 from chaosgym.machines.binned.equations import STEP_PHASE
 from chaosgym.machines.binned.held_machine import HeldMachine
 from chaosgym.machines.binned.model import exact_model
@@ -35,6 +36,16 @@ class BinnedMachine(HeldMachine):
         """
         return exact_model(self, step_phase) if self.has_propagators else stepped_model(self, 2.0 * step_phase)
 
+    @property
+    def moving(self) -> Propagation:
+        """By propagators, or by Taylor series, whose derivative costs some five runs; see ``Machine.moving``.
+
+        Deviations take linear contacts, by the propagators of the motion or the derivative of its series.
+        """
+        how = "exact propagation between contacts" if self.has_propagators else "Taylor series with contact forces"
+        deviations = self.has_propagators or all(each.exponent == LINEAR for each in self.contacts)
+        return Propagation(f"{how}, matrices held over {360.0 / self.bins:g} deg", deviations, not self.has_propagators)
+
     def arrays(self, cycles: int, samples: int = 0) -> CycleArrays:
         """Return the arrays into which ``run`` writes what happens in some cycles, with samples of the history."""
         channels = len(self.gaps) if self.sensors else 0
@@ -52,11 +63,6 @@ class BinnedMachine(HeldMachine):
         from chaosgym.machines.binned.run import run
 
         return run(self, coordinates, bouncing, arrays, integrator, tangents)
-
-    @property
-    def carries_deviations(self) -> bool:
-        """True where motion between two changes of contact is linear: deviations take the motion's propagators."""
-        return self.has_propagators
 
     def further_results(self, arrays: CycleArrays) -> dict[str, Any]:
         """Phase and components of each peak force."""

@@ -9,13 +9,15 @@ from collections import OrderedDict
 from collections.abc import Callable, Hashable, Sequence
 from functools import lru_cache
 from threading import Lock
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
 from chaosgym.arrays import Array
+from chaosgym.core import matrices
 from chaosgym.core.binned.model import BinnedModel
+from chaosgym.core.matrices import product
 from chaosgym.machines.binned.equations import (
     STEP_PHASE,
     Contact,
@@ -23,8 +25,7 @@ from chaosgym.machines.binned.equations import (
     largest_rate,
     whole_steps,
 )
-from chaosgym.machines.binned.held_machine import HeldMachine
-from chaosgym.machines.binned.structure import KEPT, machine_of, structure_of
+from chaosgym.machines.binned.held_machine import KEPT, HeldMachine, structure_of
 
 MAX_SETS = 32
 """Contact sets for which propagators are made; a machine with more is left to Taylor series."""
@@ -65,26 +66,25 @@ _recent = _RecentModels()
 class ModelsBySpeed:
     """Models, at any speed, of machines that differ in speed and clearance alone; from ``models_by_speed``."""
 
-    def __init__(self, step_phase: float, structure: tuple[Any, ...]) -> None:
-        self._step_phase, self._structure = step_phase, structure
+    def __init__(self, structure: HeldMachine, step_phase: float) -> None:
+        self._structure, self._step_phase = structure, step_phase
 
     def at(self, speed: float) -> BinnedModel:
         """Return the model at a speed, in the unit of the speed field; its gaps are zero."""
         return _recent.get((speed, self), lambda: self._made(speed))
 
     def _made(self, speed: float) -> BinnedModel:
-        kind, *_ = self._structure
-        return _at_rate(kind.rate_at(speed), self._step_phase, _structure(*self._structure))
+        return _at_rate(self._structure.rate_at(speed), self._step_phase, _structure(self._structure))
 
 
 @lru_cache(maxsize=KEPT_STRUCTURES)
-def _models_by_speed(step_phase: float, *structure: Any) -> ModelsBySpeed:
-    return ModelsBySpeed(step_phase, structure)
+def _models_by_speed(structure: HeldMachine, step_phase: float) -> ModelsBySpeed:
+    return ModelsBySpeed(structure, step_phase)
 
 
 def models_by_speed(machine: HeldMachine, step_phase: float = STEP_PHASE) -> ModelsBySpeed:
     """Models of a machine that ``has_propagators``; ``step_phase`` is that of ``BinnedMachine.reduce``."""
-    return _models_by_speed(step_phase, *structure_of(machine))
+    return _models_by_speed(structure_of(machine), step_phase)
 
 
 def exact_model(machine: HeldMachine, step_phase: float) -> BinnedModel:
@@ -93,31 +93,29 @@ def exact_model(machine: HeldMachine, step_phase: float) -> BinnedModel:
 
 
 class Channels(NamedTuple):
-    """Contacts of one row each, as in ``BinnedModel`` and ``Contact``: ``slides`` (m,), ``drag`` (m, n)."""
+    """Contacts of one row each, as in ``BinnedModel`` and ``Contact``."""
 
     row: Array
     stiffness: Array
     damping: Array
     two_sided: NDArray[np.bool_]
     reading: Array
-    slides: NDArray[np.bool_]
-    drag: Array
+    slides: tuple[int, ...]
     share: Array
 
 
 def channels_of(contacts: Sequence[Contact]) -> Channels:
-    """Contacts that have one row each, as arrays; ``share`` is given for all or for none."""
-    n = contacts[0].row.shape[1]
-    shares = [contact.share for contact in contacts if contact.share is not None]
+    """Contacts that have one row each, as arrays; ``share`` has no rows where it is 1 of all."""
+    bins = max((len(contact.share) for contact in contacts if contact.share is not None), default=0)
+    shares = [np.ones(bins) if contact.share is None else contact.share for contact in contacts]
     return Channels(
         row=np.concatenate([contact.row for contact in contacts]),
         stiffness=np.array([contact.stiffness for contact in contacts]),
         damping=np.array([contact.damping for contact in contacts]),
         two_sided=np.array([contact.two_sided for contact in contacts]),
         reading=np.concatenate([contact.reading for contact in contacts]),
-        slides=np.array([contact.slides for contact in contacts]),
-        drag=np.array([np.zeros(n) if contact.drag is None else contact.drag for contact in contacts]),
-        share=np.array(shares).T if shares else np.empty((0, len(contacts))),
+        slides=tuple(contact.slides for contact in contacts),
+        share=np.ascontiguousarray(np.array(shares).T),
     )
 
 
@@ -145,7 +143,7 @@ class _Structure(NamedTuple):
 def _push(inverse_mass: Array, channels: Channels, radix: int, friction: Array) -> Array:
     """Accelerations that the closed contacts of every set add: (sets, bins, 2n + m, n).
 
-    ``friction`` (bins, n) is what one newton of contact force drives along the guide.
+    ``friction`` (S, bins, n) is what one newton of contact force drives by each friction.
     """
     bins, n, m = len(inverse_mass), inverse_mass.shape[-1], len(channels.row)
     push = np.zeros((radix**m, bins, 2 * n + m, n))
@@ -153,8 +151,8 @@ def _push(inverse_mass: Array, channels: Channels, radix: int, friction: Array) 
         for j in range(m):
             digit = chosen // radix**j % radix
             if digit:
-                row, sign = channels.row[j], 1.0 if digit == 1 else -1.0
-                force = row + sign * channels.drag[j] + sign * channels.slides[j] * friction
+                row, sign, rubs = channels.row[j], 1.0 if digit == 1 else -1.0, channels.slides[j]
+                force = row + (sign * friction[rubs] if rubs >= 0 else np.zeros((bins, n)))
                 answer = np.einsum("bij,bj->bi", inverse_mass, force)[:, None, :]
                 if len(channels.share):
                     answer = channels.share[:, j, None, None] * answer
@@ -167,14 +165,13 @@ def _push(inverse_mass: Array, channels: Channels, radix: int, friction: Array) 
 def _rates(free: Array, pushed: Array, row: Array) -> tuple[float, float]:
     """(contact, spectrum) of ``_Structure`` from the accelerations (b, 2n, n) of some bins with all contacts closed."""
     n = free.shape[-1]
-    local = -row @ pushed[:, :n] @ np.linalg.pinv(row)
-    contact = math.sqrt(float(np.max(np.abs(np.linalg.eigvals(local)))))
+    local = product(-row, pushed[:, :n], matrices.pinv(row))
+    contact = math.sqrt(float(np.max(matrices.modulus(matrices.eigvals(local)))))
     return contact, largest_rate(free + pushed)
 
 
 @lru_cache(maxsize=KEPT)
-def _structure(kind: type, *structure: Any) -> _Structure:
-    machine = machine_of(kind, structure)
+def _structure(machine: HeldMachine) -> _Structure:
     inverse_mass, free, forcing, friction, _ = machine.held()
     n = inverse_mass.shape[-1]
     channels = channels_of(machine.contacts)
@@ -216,13 +213,14 @@ def _closed(channels: Channels, radix: int) -> tuple[Array, Array]:
     for chosen in range(radix**m):
         closed = [j for j in range(m) if chosen // radix**j % radix]
         lag[chosen, closed] = channels.damping[closed] / channels.stiffness[closed]
-        anchor[chosen][:, closed] = np.linalg.pinv(channels.row[closed])
+        anchor[chosen][:, closed] = matrices.pinv(channels.row[closed])
     return lag, anchor
 
 
 def _at_rate(rate: float, step_phase: float, parts: _Structure) -> BinnedModel:
     from chaosgym.core.binned.series import series_order
     from chaosgym.core.binned.tables import tables
+    from chaosgym.core.compilation import call
     from chaosgym.core.lanes import LANES
 
     bins = parts.bins
@@ -248,5 +246,5 @@ def _at_rate(rate: float, step_phase: float, parts: _Structure) -> BinnedModel:
         reach=np.linalg.norm(parts.channels.reading, axis=1),
         display=parts.display,
         anchor=parts.anchor,
-        table=tables(*accelerations, parts.channels.row, parts.lag, parts.anchor, duration, steps, order),
+        table=call(tables, *accelerations, parts.channels.row, parts.lag, parts.anchor, duration, steps, order),
     )

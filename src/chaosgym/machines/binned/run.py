@@ -48,7 +48,7 @@ def run(
     cycles, at_once, done = len(arrays.section), max(1, STEPS_AT_ONCE // steps), 0
     while done < cycles:
         part = CycleArrays(*(values[done : done + at_once] for values in arrays))
-        if kernel is advance:
+        if kernel is not advance_binned_fixed_step:
             vectors, log_growth = tangents or no_tangents(len(coordinates), cycles)
             part_settings = (*settings, Tangents(vectors, log_growth[done : done + at_once]))
         else:
@@ -105,6 +105,10 @@ class BinnedBatch(KickedBatch):
         for i, speed in zip(which.tolist(), speeds.tolist(), strict=True):
             if self._speeds[i] == speed:
                 continue
+            machine = self._machines[i]
+            if machine.speed_field not in machine.beside_matrices and machine.drive_speed != speed:
+                self._machines[i] = machine.at(speed)
+                self._models[i] = models_by_speed(self._machines[i])
             pair = self._models[i], speed
             if pair not in found:
                 found[pair] = pair[0].at(speed)

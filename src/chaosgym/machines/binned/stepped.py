@@ -7,9 +7,9 @@ import numpy as np
 
 from chaosgym.arrays import Array
 from chaosgym.core.binned.model import FORCING_TERMS, TaylorModel
+from chaosgym.core.matrices import product
 from chaosgym.machines.binned.equations import even_powers, largest_rate, whole_steps
-from chaosgym.machines.binned.held_machine import HeldMachine
-from chaosgym.machines.binned.structure import kept_held, structure_of
+from chaosgym.machines.binned.held_machine import HeldMachine, kept_held, structure_of
 
 PIECE_PHASE = 2.0
 """Longest piece of a Taylor series times largest eigenvalue without contact."""
@@ -33,18 +33,18 @@ def stepped_model(machine: HeldMachine, step_phase: float) -> TaylorModel:
 
     A closed contact turns by ``step_phase`` / 4 in a piece of a series; half of it leaves a sixteenth of the error.
     """
-    inverse_mass, free, forcing, friction, tangent = kept_held(*structure_of(machine))
+    inverse_mass, free, forcing, friction, tangent = kept_held(structure_of(machine))
     contacts = machine.contacts
     row = np.concatenate([contact.row for contact in contacts])
     rate = machine.crank_rate
     acceleration = _free_motion(free, forcing, rate)
     first = np.cumsum([0] + [len(contact.row) for contact in contacts])
-    answer = np.swapaxes(inverse_mass @ row.T, -1, -2)
+    answer = np.swapaxes(product(inverse_mass, row.T), -1, -2)
     for at, each in zip(first, contacts, strict=False):
-        if each.slides and len(each.row) == PIN_ROWS:
+        if each.slides >= 0 and len(each.row) == PIN_ROWS:
             across = np.array([answer[:, at + 1], -answer[:, at]])
-            answer[:, at : at + PIN_ROWS] += np.swapaxes(tangent[:, None] * across, 0, 1)
-    slide = -np.einsum("bij,bj->bi", inverse_mass, friction)
+            answer[:, at : at + PIN_ROWS] += np.swapaxes(tangent[each.slides][:, None] * across, 0, 1)
+    slide = -np.einsum("bij,sbj->bsi", inverse_mass, friction)
     contact = math.sqrt(machine.stiffest * np.max(np.einsum("brn,rn->br", answer, row)))
     bins = len(inverse_mass)
     duration = 2.0 * math.pi / (bins * rate)
@@ -55,14 +55,14 @@ def stepped_model(machine: HeldMachine, step_phase: float) -> TaylorModel:
         longest=duration / max(1.0, duration * spectrum / SPAN_PHASE),
         tolerance=SPAN_ERROR * step_phase**4,
         contact_rate=contact,
-        acceleration=_with_readings(np.concatenate([acceleration, -answer, slide[:, None]], axis=1), row),
+        acceleration=_with_readings(np.concatenate([acceleration, -answer, slide], axis=1), row),
         first=first,
         row=row,
         gap=np.array([contact.gap for contact in contacts]),
         stiffness=np.array([contact.stiffness for contact in contacts]),
         damping=np.array([contact.damping for contact in contacts]),
-        law=machine.law,
-        slides=np.array([float(contact.slides) for contact in contacts]),
+        exponent=np.array([contact.exponent for contact in contacts]),
+        slides=np.array([contact.slides for contact in contacts]),
         two_sided=np.array([contact.two_sided for contact in contacts]),
         reading=np.concatenate([contact.reading for contact in contacts]),
         monitored=np.array([bool(np.any(contact.reading)) for contact in contacts]),
@@ -82,7 +82,7 @@ def _with_readings(accelerations: Array, row: Array) -> Array:
 
     rows, n = row.shape
     lanes = np.zeros((*accelerations.shape[:-1], padded(rows + n)))
-    lanes[..., :rows] = accelerations @ row.T
+    lanes[..., :rows] = product(accelerations, row.T)
     lanes[..., rows : rows + n] = accelerations
     return lanes
 
@@ -93,5 +93,5 @@ def fastest_rate(machine: HeldMachine, model: TaylorModel) -> float:
     some = model.acceleration[machine.sampled_bins, :, rows : rows + n]
     pushes = slice(2 * n + FORCING_TERMS, 2 * n + FORCING_TERMS + rows)
     accelerations = some[:, : 2 * n].copy()
-    accelerations[:, :n] += machine.stiffest * model.row.T @ some[:, pushes]
+    accelerations[:, :n] += product(machine.stiffest * model.row.T, some[:, pushes])
     return largest_rate(accelerations)

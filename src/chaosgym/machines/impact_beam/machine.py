@@ -2,7 +2,7 @@
 
 import math
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import lru_cache
 from typing import TYPE_CHECKING, Any
 
@@ -11,13 +11,23 @@ from numpy.typing import NDArray
 
 from chaosgym.arrays import Array
 from chaosgym.core.modal_model import ModalImpactModel
+from chaosgym.machines.abilities import BendingPart
 from chaosgym.machines.flexible_model import flexible_model
-from chaosgym.machines.impact_beam.modes import modal_analysis, modal_curvatures, static_tip_deflection
-from chaosgym.machines.impact_beam.parameters import BeamParameters
+from chaosgym.machines.impact_beam.modes import (
+    inseparable,
+    modal_analysis,
+    modal_curvatures,
+    static_tip_deflection,
+)
+from chaosgym.machines.impact_beam.parameters import FINER, FITTED, LADDER, BeamParameters
 from chaosgym.machines.integrators import TIGHTEST_EVENTS, ExactEvents
+from chaosgym.machines.modal_blocks import nearly_rigid
 
 if TYPE_CHECKING:
     from chaosgym.machines.picture import Sketch
+
+HELD = 10.0
+"""Drive over a mode's frequency from which its spring may be left out, with an error of 1 % (derived: f0^2 / f^2)."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -49,6 +59,21 @@ class ImpactBeam(BeamParameters):
         return np.asarray(modal_analysis(self).angular_frequency / (2.0 * math.pi))
 
     @property
+    def finer(self) -> "ImpactBeam | None":
+        """The beam with 1.5 times as many modes at the least; see ``Machine.finer``."""
+        count = next((count for count in FINER if count >= 1.5 * self.n_modes), FINER[-1])
+        if count <= self.n_modes:
+            return None
+        return replace(self, n_modes=count, fitted_modes=FITTED if self.reduction == "free" else 0)
+
+    @property
+    def models(self) -> "tuple[ImpactBeam, ...]":
+        """Models that a tolerance may choose; see ``Machine.models``."""
+        if self.reduction != "free":
+            return super().models
+        return tuple(replace(self, n_modes=count, fitted_modes=FITTED) for count in LADDER)
+
+    @property
     def default_integrator(self) -> ExactEvents:
         """Integrator where none is given."""
         return TIGHTEST_EVENTS if self.event_accuracy == "tightest" else ExactEvents()
@@ -69,16 +94,31 @@ class ImpactBeam(BeamParameters):
 
         return sketch_of_beam(record, rows)
 
-    def stress_at(self, position: float) -> Array:
-        """Bending stress (n,) for each mode at a position [m] from the pivot on; see ``Machine.stress_at``."""
-        return -0.5 * self.height * self.youngs_modulus * modal_curvatures(self, position)
+    @property
+    def bending_parts(self) -> Mapping[str, BendingPart]:
+        """The beam; positions are from the pivot on."""
+        return {"": BendingPart(self._fibre_stress)}
+
+    def _fibre_stress(self, position: float, _fibre: float) -> Array:
+        upper = -0.5 * self.height * self.youngs_modulus * modal_curvatures(self, position)
+        return np.stack([upper, -upper])
 
     @property
     def structure(self) -> ModalImpactModel:
         """Model of the beam, whatever frequency, force and clearance; beams that differ in these alone share it."""
-        return self.interpolated or _structure(
+        model = self.interpolated or _structure(
             self._with_unchecked(excitation_frequency=1.0, force_amplitude=0.0, clearance=0.0)
         )
+        if not model.stiffness.all():
+            self._refuse_slow_drive()
+        return model
+
+    def _refuse_slow_drive(self) -> None:
+        """Refuse a drive so slow that the springs count of modes which are taken for motions of a rigid body."""
+        rates = modal_analysis(self).angular_frequency
+        held = float(np.max(rates[nearly_rigid(rates)], initial=0.0)) / (2.0 * math.pi)
+        if self.excitation_frequency < HELD * held:
+            raise inseparable(self)
 
 
 @lru_cache(maxsize=256)

@@ -6,6 +6,8 @@ from functools import cache
 import numpy as np
 
 from chaosgym.arrays import Array
+from chaosgym.core import matrices
+from chaosgym.core.matrices import product
 from chaosgym.errors import ParameterError
 from chaosgym.machines.beam_element import bending_matrices, fitted_modes, graded_mesh
 from chaosgym.machines.flexible_model import Modes
@@ -80,26 +82,29 @@ def _mesh(beam: BeamParameters, elements: int) -> Array:
 
 def _analysed(beam: BeamParameters, elements: int | None = None, position: float | None = None) -> tuple[Modes, Array]:
     """Modes, and their curvatures (n,) at a position; none without one."""
-    elements = elements or max(MIN_ELEMENTS, 3 * beam.n_modes)
+    try:
+        return _reduced(beam, elements or max(MIN_ELEMENTS, 3 * beam.n_modes), position)
+    except np.linalg.LinAlgError as error:
+        raise inseparable(beam) from error
+
+
+def _reduced(beam: BeamParameters, elements: int, position: float | None) -> tuple[Modes, Array]:
     mass, stiffness, at_force, tip = _assembled(beam, elements)
     bent = np.zeros((0, len(mass))) if position is None else _curvature_row(beam, elements, position, len(mass))[None]
     basis = None
     if beam.reduction == "interfaces":
         basis = _interface_basis(mass, stiffness, tuple(dict.fromkeys((0, 1, at_force, tip))), beam.n_modes)
-        mass, stiffness = basis.T @ mass @ basis, basis.T @ stiffness @ basis
+        mass, stiffness = product(basis.T, mass, basis), product(basis.T, stiffness, basis)
     angular, shapes = _natural_modes(beam, mass, stiffness)
     places = [tip, at_force, 0, 1]
-    ends = shapes[places] if basis is None else basis[places] @ shapes
-    bent = (bent if basis is None else bent @ basis) @ shapes * np.where(ends[0] < 0.0, -1.0, 1.0)
+    ends = shapes[places] if basis is None else product(basis[places], shapes)
+    bent = product(bent if basis is None else product(bent, basis), shapes) * np.where(ends[0] < 0.0, -1.0, 1.0)
     ends = ends * np.where(ends[0] < 0.0, -1.0, 1.0)
     reference = angular[1]
     if beam.fitted_modes:
-        try:
-            fitted, mix = fitted_modes(angular[beam.n_modes :], ends[0, beam.n_modes :], beam.fitted_modes)
-        except np.linalg.LinAlgError as error:
-            raise _inseparable(beam) from error
-        at_ends = ends[:, beam.n_modes :] @ mix
-        of_fitted = bent[:, beam.n_modes :] @ mix * np.where(at_ends[0] < 0.0, -1.0, 1.0)
+        fitted, mix = fitted_modes(angular[beam.n_modes :], ends[0, beam.n_modes :], beam.fitted_modes)
+        at_ends = product(ends[:, beam.n_modes :], mix)
+        of_fitted = product(bent[:, beam.n_modes :], mix) * np.where(at_ends[0] < 0.0, -1.0, 1.0)
         bent = np.hstack([bent[:, : beam.n_modes], of_fitted])
         angular = np.concatenate([angular[: beam.n_modes], fitted])
         ends = np.hstack([ends[:, : beam.n_modes], at_ends * np.where(at_ends[0] < 0.0, -1.0, 1.0)])
@@ -112,24 +117,15 @@ def _analysed(beam: BeamParameters, elements: int | None = None, position: float
 
 def _natural_modes(beam: BeamParameters, mass: Array, stiffness: Array) -> tuple[Array, Array]:
     """Angular frequencies [rad/s] and mass-normalised shapes, slowest first: all, or as many as are needed."""
-    from scipy.linalg import eigh
-
     size = len(mass)
     wanted = size if beam.fitted_modes else max(beam.n_modes, 2)
     # the inverse problem, M s = K s / w^2, keeps the slow rocking mode exact on fine meshes
     scale = 1.0 / np.sqrt(np.diag(stiffness))
-    try:
-        inverse_squares, shapes = eigh(
-            mass * np.outer(scale, scale),
-            stiffness * np.outer(scale, scale),
-            subset_by_index=[size - wanted, size - 1],
-        )
-    except np.linalg.LinAlgError as error:
-        raise _inseparable(beam) from error
-    inverse_squares, shapes = inverse_squares[::-1], shapes[:, ::-1]
+    inverse_squares, shapes = matrices.eigh(mass * np.outer(scale, scale), stiffness * np.outer(scale, scale))
+    inverse_squares, shapes = inverse_squares[: -wanted - 1 : -1], shapes[:, : -wanted - 1 : -1]
     slowest, slow = float(inverse_squares[0]), max(beam.n_modes, 2)
     if inverse_squares[slow - 1] < 1e-14 * slowest:
-        raise _inseparable(beam)
+        raise inseparable(beam)
     # what rounding leaves of the fastest modes of the mesh bends no tip
     kept = inverse_squares > 1e-14 * slowest
     return 1.0 / np.sqrt(inverse_squares[kept]), scale[:, None] * shapes[:, kept] / np.sqrt(inverse_squares[kept])
@@ -142,15 +138,13 @@ def _interface_basis(mass: Array, stiffness: Array, kept: tuple[int, ...], count
     ----------
     Craig and Bampton, Coupling of substructures for dynamic analyses, AIAA Journal 6 (1968); thesis 2.2.1.
     """
-    from scipy.linalg import eigh
-
     inner = [i for i in range(len(mass)) if i not in kept]
     at = np.ix_(inner, inner)
     basis = np.zeros((len(mass), count))
     basis[kept, range(len(kept))] = 1.0
-    basis[inner, : len(kept)] = -np.linalg.solve(stiffness[at], stiffness[np.ix_(inner, kept)])
+    basis[inner, : len(kept)] = -matrices.solve(stiffness[at], stiffness[np.ix_(inner, kept)])
     if count > len(kept):
-        basis[inner, len(kept) :] = eigh(stiffness[at], mass[at], subset_by_index=[0, count - len(kept) - 1])[1]
+        basis[inner, len(kept) :] = matrices.eigh(stiffness[at], mass[at])[1][:, : count - len(kept)]
     return basis
 
 
@@ -166,13 +160,15 @@ def _structural_damping(beam: BeamParameters, angular: Array, ends: Array, refer
     return np.asarray(beam.damping_ratio / (math.pi * pinned_pinned_frequency(beam, beam.length)) * own)
 
 
-def _inseparable(beam: BeamParameters) -> ParameterError:
+def inseparable(beam: BeamParameters) -> ParameterError:
+    """What is raised of a beam whose modes rounding hides."""
     return ParameterError(
         f"n_modes = {beam.n_modes} and fitted_modes = {beam.fitted_modes} of a beam with "
         f"length = {beam.length:g} m, height = {beam.height:g} m, "
-        f"pivot_rotational_stiffness = {beam.pivot_rotational_stiffness:g} N m/rad and shaker_stiffness = "
-        f"{beam.shaker_stiffness:g} N/m differ so much in frequency that rounding hides some; "
-        "allowed: fewer modes, or stiffer springs"
+        f"pivot_rotational_stiffness = {beam.pivot_rotational_stiffness:g} N m/rad, shaker_stiffness = "
+        f"{beam.shaker_stiffness:g} N/m and shaker_mass = {beam.shaker_mass:g} kg differ so much in frequency that "
+        "rounding hides some; "
+        "allowed: fewer modes, stiffer springs, or a lighter shaker"
     )
 
 
@@ -181,7 +177,7 @@ def static_tip_deflection(beam: BeamParameters) -> float:
     _, stiffness, at_force, tip = _assembled(beam, MIN_ELEMENTS)
     load = np.zeros(len(stiffness))
     load[at_force] = beam.force_amplitude
-    return float(np.linalg.solve(stiffness, load)[tip])
+    return float(matrices.solve(stiffness, load)[tip])
 
 
 def pinned_pinned_frequency(beam: BeamParameters, length: float) -> float:
@@ -194,9 +190,7 @@ def pinned_pinned_frequency(beam: BeamParameters, length: float) -> float:
 @cache
 def _pinned_pinned_rate() -> float:
     """First natural frequency [rad/s] of a pinned beam of unit length, stiffness and mass, by finite elements."""
-    from scipy.linalg import eigh
-
     mass, stiffness = bending_matrices(graded_mesh((0.0, 1.0), MIN_ELEMENTS), 1.0, 1.0)
     free = [i for i in range(len(mass)) if i not in (0, len(mass) - 2)]
-    lowest = eigh(stiffness[np.ix_(free, free)], mass[np.ix_(free, free)], eigvals_only=True, subset_by_index=[0, 0])
-    return math.sqrt(float(lowest[0]))
+    squares, _ = matrices.eigh(stiffness[np.ix_(free, free)], mass[np.ix_(free, free)])
+    return math.sqrt(float(squares[0]))

@@ -21,6 +21,12 @@ from chaosgym.machines.parameters import parameter
 
 _FIT = "docs/development/calibration.md"
 
+LADDER, FITTED = (4, 7, 10, 14, 20, 30), 2
+"""Modes, beside the fitted ones, of the models that a tolerance may choose."""
+
+FINER = (4, 10, 14, 20, 30, 40)
+"""Modes of finer models: the least of them that is at least 1.5 times as many tells the error of a model."""
+
 INTERFACES = 4
 """Deflection and slope at the pivot, deflections at shaker and tip: kept by the reduction "interfaces"."""
 
@@ -45,10 +51,13 @@ class BeamParameters(ModalImpactMachine):
         }
         for rung, modes, fitted, accuracy in (
             ("standard", 4, 2, "standard"),
-            ("fine", 6, 2, "standard"),
+            ("fine", 10, 2, "standard"),
             ("reference", 20, 2, "tightest"),
         )
     }
+
+    model_fields: ClassVar[tuple[str, ...]] = ("n_modes", "fitted_modes")
+    documented_errors: ClassVar[Mapping[str, float]] = {"standard": 0.05, "fine": 0.005, "reference": 0.001}
 
     name: ClassVar[str] = "impact-beam"
     speed_field: ClassVar[str] = "excitation_frequency"

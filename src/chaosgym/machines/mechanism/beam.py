@@ -11,13 +11,16 @@ Craig and Bampton, Coupling of substructures for dynamic analyses, AIAA Journal 
 
 import math
 from collections.abc import Mapping
+from functools import cache, partial
 from typing import NamedTuple
 
 import numpy as np
 
 from chaosgym.arrays import Array
+from chaosgym.core import matrices
+from chaosgym.core.matrices import product
 from chaosgym.machines.beam_element import POINTS, bending_matrices, fitted_modes, interpolation
-from chaosgym.machines.mechanism.links import Beam, Body, Link, Places, together
+from chaosgym.machines.mechanism.links import Beam, Body, Link, LinkPlaces, together
 
 ELEMENTS = 10
 """Finite elements, at least; more modes take two a mode."""
@@ -28,7 +31,7 @@ START, END = "start", "end"
 STRETCH = "stretch"
 
 
-class Bending(NamedTuple):
+class BendingModes(NamedTuple):
     """Modes of a beam in a plane, pinned at both ends; p points of integration.
 
     Attributes
@@ -57,7 +60,7 @@ class Bending(NamedTuple):
     whole: Array
 
 
-def bending_of(beam: Beam, second_moment: float, ends: tuple[tuple[float, float], ...]) -> Bending:
+def bending_of(beam: Beam, second_moment: float, ends: tuple[tuple[float, float], ...]) -> BendingModes:
     """Modes of a beam in a plane.
 
     Parameters
@@ -70,8 +73,6 @@ def bending_of(beam: Beam, second_moment: float, ends: tuple[tuple[float, float]
         Of what turns with start and end: static moment along the beam [kg m], and moment of inertia about that end
         [kg m^2].
     """
-    from scipy.linalg import eigh
-
     count = max(ELEMENTS, 2 * beam.modes)
     lengths, line = np.full(count, beam.length / count), beam.density * beam.area
     mass, stiffness = bending_matrices(lengths, beam.youngs_modulus * second_moment, line)
@@ -84,24 +85,33 @@ def bending_of(beam: Beam, second_moment: float, ends: tuple[tuple[float, float]
     inner = [i for i in range(size) if i not in (0, size - 2)]
     at = np.ix_(inner, inner)
     kept, modes = beam.modes, beam.modes + beam.fitted
-    squares, shapes = eigh(stiffness[at], mass[at], subset_by_index=[0, (len(inner) if beam.fitted else kept) - 1])
+    squares, shapes = matrices.eigh(stiffness[at], mass[at])
+    if not beam.fitted:
+        squares, shapes = squares[:kept], shapes[:, :kept]
     if beam.fitted:
         straight = np.full(size, 1.0 / beam.length)
         straight[::2] = np.linspace(0.0, 1.0, count + 1)
-        driven = shapes.T @ (mass @ straight)[inner]
+        driven = product(shapes.T, product(mass, straight)[inner])
         angular, mix = fitted_modes(np.sqrt(squares[kept:]), driven[kept:], beam.fitted)
         squares = np.concatenate([squares[:kept], angular**2])
-        shapes = np.hstack([shapes[:, :kept], shapes[:, kept:] @ mix])
+        shapes = np.hstack([shapes[:, :kept], product(shapes[:, kept:], mix)])
     basis = np.zeros((size, modes))
     basis[inner] = shapes * np.where(shapes[0] < 0.0, -1.0, 1.0)
-    inside = points.slope @ basis
+    inside = product(points.slope, basis)
     drawn, whole = _drawn_in(inside, beam.length / count)
-    return Bending(
-        squares, points.position, points.weight, points.deflection @ basis, inside, basis[list(slopes)], drawn, whole
+    return BendingModes(
+        squares,
+        points.position,
+        points.weight,
+        product(points.deflection, basis),
+        inside,
+        basis[list(slopes)],
+        drawn,
+        whole,
     )
 
 
-def elastic_of(beam: Beam, carried: float, planes: tuple[Bending, ...]) -> tuple[Array, Array]:
+def elastic_of(beam: Beam, carried: float, planes: tuple[BendingModes, ...]) -> tuple[Array, Array]:
     """Stiffness and damping (e,) of the stretch, with a mass [kg] at the end, and of the modes in some planes."""
     line, spring = beam.density * beam.area, beam.youngs_modulus * beam.area / beam.length
     squares = np.concatenate([plane.squares for plane in planes])
@@ -128,20 +138,20 @@ def beam_link(name: str, beam: Beam, ends: Mapping[str, tuple[Body, ...]], angle
     turning = []
     for end in (START, END):
         bodies = ends.get(end, ())
-        about = sum(body.inertia + body.mass * float(np.dot(body.centre, body.centre)) for body in bodies)
+        about = sum(body.inertia + body.mass * float(product(body.centre, body.centre)) for body in bodies)
         turning.append((sum(body.mass * body.centre[0] for body in bodies), about))
     bending = bending_of(beam, beam.second_moment, tuple(turning))
     first, modes = int(beam.stretches), beam.modes + beam.fitted
     elastic = first + modes
 
-    def places(along: Array, across: Array, slope: Array, drawn: Array) -> Places:
+    def places(along: Array, across: Array, slope: Array, drawn: Array) -> LinkPlaces:
         shape, curve = np.zeros((len(along), 2, elastic)), np.zeros((len(along), 2, elastic, elastic))
         if first:
             shape[:, 0, 0] = along / beam.length
         shape[:, 1, first:] = across
         curve[:, 0, first:, first:] = -drawn
         full = np.concatenate([np.zeros((len(slope), first)), slope], axis=1)
-        return Places(np.stack([along, np.zeros_like(along)], axis=1), shape, full, curve)
+        return LinkPlaces(np.stack([along, np.zeros_like(along)], axis=1), shape, full, curve)
 
     none = np.zeros_like(bending.slope)
     bar = places(bending.position, bending.deflection, none, bending.drawn)
@@ -165,6 +175,7 @@ def beam_link(name: str, beam: Beam, ends: Mapping[str, tuple[Body, ...]], angle
         np.diag(stiffness),
         np.diag(damping),
         beam,
+        remade=partial(beam_link, name, ends=ends, angle=angle),
     )
 
 
@@ -202,7 +213,7 @@ def curvatures(beam: Beam, second_moment: float, squares: Array, slopes: Array, 
     """Curvature (m,) [1/m] of modes at a section [m], of their squares (m,) and slopes (2, m) at start and end."""
     length, line = beam.length, beam.density * beam.area
     found = np.zeros(len(squares))
-    for k, b in enumerate((line * squares / (beam.youngs_modulus * second_moment)) ** 0.25):
+    for k, b in enumerate(matrices.power(line * squares / (beam.youngs_modulus * second_moment), 0.25)):
         cosine, sine, fade = math.cos(b * length), math.sin(b * length), math.exp(-b * length)
         ends = [
             [1.0, 0.0, 1.0, fade],
@@ -210,10 +221,16 @@ def curvatures(beam: Beam, second_moment: float, squares: Array, slopes: Array, 
             [0.0, b, -b, b * fade],
             [-b * sine, b * cosine, -b * fade, b],
         ]
-        weights = np.linalg.solve(np.array(ends), np.array([0.0, 0.0, *slopes[:, k]]))
+        weights = matrices.solve(np.array(ends), np.array([0.0, 0.0, *slopes[:, k]]))
         shapes = [-math.cos(b * position), -math.sin(b * position), math.exp(-b * position)]
-        found[k] = b**2 * float(weights @ [*shapes, math.exp(-b * (length - position))])
+        found[k] = b**2 * float(product(weights, [*shapes, math.exp(-b * (length - position))]))
     return found
+
+
+@cache
+def parabolas() -> Array:
+    """Coefficients of a parabola over an element from its values at the points of integration."""
+    return matrices.pinv(np.vander(POINTS, 3, increasing=True))
 
 
 def _drawn_in(slope: Array, length: float) -> tuple[Array, Array]:
@@ -222,22 +239,18 @@ def _drawn_in(slope: Array, length: float) -> tuple[Array, Array]:
     Slopes are parabolas over each element, of the given length.
     """
     powers = np.arange(3)
-    coefficients = np.einsum(
-        "ik,ekm->eim",
-        np.linalg.pinv(np.vander(POINTS, 3, increasing=True)),
-        slope.reshape(-1, len(POINTS), slope.shape[1]),
-    )
+    coefficients = np.einsum("ik,ekm->eim", parabolas(), slope.reshape(-1, len(POINTS), slope.shape[1]))
     ends = powers[:, None] + powers + 1
-    weight = length * np.append(POINTS, 1.0)[:, None, None] ** ends / ends
+    weight = length * matrices.power(np.append(POINTS, 1.0)[:, None, None], ends) / ends
     inside = np.einsum("kij,eim,ejn->ekmn", weight, coefficients, coefficients)
     before = np.cumsum(inside[:, -1], axis=0)
     upto = inside[:, :-1] + np.concatenate([np.zeros_like(before[:1]), before[:-1]])[:, None]
     return upto.reshape(-1, *before.shape[1:]), before[-1]
 
 
-def _offset(end: Places, centre: Array) -> Places:
+def _offset(end: LinkPlaces, centre: Array) -> LinkPlaces:
     """A point that turns with the end of a beam, away from it by ``centre`` (2,)."""
     slope = end.slope[0]
     shape = end.shape + np.outer([-centre[1], centre[0]], slope)
     curve = end.curve - centre[None, :, None, None] * np.outer(slope, slope)
-    return Places(end.place + centre, shape, end.slope, curve)
+    return LinkPlaces(end.place + centre, shape, end.slope, curve)

@@ -23,11 +23,12 @@ from typing import NamedTuple
 import numpy as np
 
 from chaosgym.arrays import Array
+from chaosgym.core.matrices import product
 from chaosgym.errors import ParameterError
+from chaosgym.machines.mechanism.joints import ACROSS, ALONG
 from chaosgym.machines.mechanism.mechanism import Mechanism
 from chaosgym.machines.mechanism.nominal import Nominal, Revolution, nominal
-from chaosgym.machines.mechanism.sums import Sums, spring_length
-from chaosgym.machines.periodic import between
+from chaosgym.machines.mechanism.sums import Sums, between, spring_length
 
 TAIL = 1e-10
 """Share of the largest term of a Fourier series that the upper third of its terms may have."""
@@ -99,20 +100,36 @@ def smooth(mechanism: Mechanism, revolution: Revolution) -> tuple[Array, Nominal
     )
 
 
+class Rubbing(NamedTuple):
+    """Forces on J joints with friction, at B crank angles.
+
+    ``rate`` (J, B) of the sliding of each per radian of the crank, or of the turning of a pin; ``motion`` (J, n, B) the
+    same per unit of each coordinate; ``forces`` (3, R, B) along the R motions that press them, by powers of the rate,
+    of which each joint has the ``rows``; ``answer`` (J, R, B) what a unit of its friction adds to the forces.
+    """
+
+    rate: Array
+    motion: Array
+    forces: Array
+    answer: Array
+    rows: tuple[list[int], ...]
+
+
 class Assembled(NamedTuple):
     """Equations of small motions on a grid of G angles of a revolution, by k kinds of pulls: see ``Sums``.
 
     ``matrices`` (G, 3 + k, n, n): M, both parts of D, and K; empty if only loads are known. ``load`` (G, k, n),
-    ``torque`` (G, k). Kinds beyond the powers of the rate are those of forces of 1 N of ``mechanism``. ``sliding``
-    (G, 1 + n) of a joint along its axis, or the turning of a pin in the plane, per radian of the crank and per unit of
-    each coordinate; empty without one.
+    ``torque`` (G, k). Kinds beyond the powers of the rate are those of forces of 1 N of ``mechanism``. ``slips``
+    (G, J, 1 + n + R) and ``presses`` (G, k, R) are ``Rubbing``.
     """
 
     mechanism: Mechanism
     matrices: Array
     load: Array
     torque: Array
-    sliding: Array
+    slips: Array
+    presses: Array
+    rows: tuple[list[int], ...] = ()
 
     def at(self, theta: Array) -> SmallMotion:
         """Equations at crank angles (B,) [rad]."""
@@ -131,10 +148,17 @@ class Assembled(NamedTuple):
         """Torque (3, B) of the drive at crank angles (B,) [rad]."""
         return self._forced(np.swapaxes(between(self.torque, theta), 0, 1), theta)
 
-    def sliding_at(self, theta: Array) -> tuple[Array, Array]:
-        """Sliding of the joint per radian of the crank, (B,), and per unit of each coordinate, (B, n)."""
-        found = between(self.sliding, theta)
-        return found[:, 0], found[:, 1:]
+    def rubbing_at(self, theta: Array) -> Rubbing:
+        """Joints with friction that were named, at crank angles (B,) [rad]."""
+        rate, motion, answer = np.split(between(self.slips, theta), [1, 1 + self.load.shape[2]], axis=2)
+        forces = self._forced(np.swapaxes(between(self.presses, theta), 0, 1), theta)
+        return Rubbing(
+            np.moveaxis(rate[..., 0], 0, -1),
+            np.moveaxis(motion, 0, -1),
+            np.swapaxes(forces, 1, 2),
+            np.moveaxis(answer, 0, -1),
+            self.rows,
+        )
 
     def _forced(self, found: Array, theta: Array) -> Array:
         """By the three powers of the rate, (3, B, ...), of all kinds of pulls (k, B, ...)."""
@@ -147,7 +171,12 @@ class Assembled(NamedTuple):
 
 
 def assembled(
-    mechanism: Mechanism, revolution: Revolution, *, matrices: bool = True, geometric: bool = True, slides: str = ""
+    mechanism: Mechanism,
+    revolution: Revolution,
+    *,
+    matrices: bool = True,
+    geometric: bool = True,
+    rubbing: tuple[str, ...] = (),
 ) -> Assembled:
     """Equations of all angles of a revolution.
 
@@ -159,8 +188,8 @@ def assembled(
         False for loads and torques alone, in a fraction of the time.
     geometric
         Whether the forces of the nominal motion stiffen. Without it the axes of bodies that turn stay unit vectors.
-    slides
-        Joint whose sliding is told, if any, or whose turning if it is revolute, in the plane.
+    rubbing
+        Joints whose forces are told, and how they slide along their axis or, if revolute in the plane, turn.
 
     Raises
     ------
@@ -169,29 +198,49 @@ def assembled(
     """
     theta, found = smooth(mechanism, revolution)
     gaps = found.inverse[:, :, mechanism.size - len(mechanism.coordinates) :]
-    kinds = 3 + mechanism.dimensions * len(mechanism.forces)
+    parts = [force.parts(mechanism.dimensions) for force in mechanism.forces]
+    kinds = 3 + sum(parts)
     sums = Sums(mechanism, revolution, found, theta, gaps, kinds=kinds, matrices=matrices, geometric=geometric)
     for link in mechanism.links:
         sums.add_link(link)
         if matrices and link.elastic:
             sums.add_elastic(link)
     for k, force in enumerate(mechanism.forces):
-        sums.add_forces(force.point, 3 + mechanism.dimensions * k)
+        sums.add_forces(force, 3 + sum(parts[:k]))
     for spring in mechanism.springs:
         sums.add_spring(spring)
+    for held in mechanism.torsion:
+        sums.add_torsion(held)
     if matrices:
         sums.add_geometric()
-    sliding = np.empty((len(theta), 0))
-    if slides:
-        which = next(joint for joint in mechanism.joints if joint.name == slides)
-        along = mechanism.along(found.z, which)[1]
-        if which.kind == "revolute":
-            along = mechanism.motions(found.z)[1][:, mechanism.joints.index(which), 2]
-        sliding = (along[:, None] @ found.inverse)[:, 0]
-        sliding = np.delete(sliding, np.arange(1, mechanism.size - gaps.shape[-1]), axis=1)
     every = np.concatenate([sums.mass[None], sums.damping, sums.stiffness]) if matrices else np.empty((0, 0, 0, 0))
     whole, load, torque = (np.moveaxis(part, 0, 1) for part in (every, sums.load, sums.torque))
-    return Assembled(mechanism, whole, load, torque, sliding)
+    return Assembled(mechanism, whole, load, torque, *_rubbing(sums, gaps.shape[-1], rubbing))
+
+
+def _rubbing(sums: Sums, n: int, names: tuple[str, ...]) -> tuple[Array, Array, tuple[list[int], ...]]:
+    """``slips``, ``presses`` and ``rows`` of some joints, with n coordinates."""
+    mechanism, found = sums.mechanism, sums.found
+    rows = list(enumerate(mechanism.rows(), mechanism.lead))
+    places: list[int] = []
+    pressing: list[list[int]] = []
+    joints = [joint for name in names for joint in mechanism.joints if joint.name == name]
+    for joint in joints:
+        # a gap is held in its middle by all that its surfaces can push, a tight joint by what presses its axis
+        across = {*joint.opened} or {ACROSS, *([ALONG] if joint.kind == "revolute" else [])}
+        own = [k for k, row in rows if row.joint is joint and row.motion in across]
+        pressing.append(list(range(len(places), len(places) + len(own))))
+        places += own
+    slips = np.empty((len(sums.theta), len(joints), 1 + n + len(places)))
+    for j, joint in enumerate(joints):
+        along = mechanism.along(found.z, joint)[1]
+        if joint.kind == "revolute":
+            along = mechanism.motions(found.z)[1][:, mechanism.joints.index(joint), 2]
+        answer = product(along[:, None], found.inverse)[:, 0]
+        slips[:, j] = np.concatenate([answer[:, :1], answer[:, mechanism.size - n :], answer[:, places]], axis=1)
+        if mechanism.prescribed:
+            slips[:, j, 0] = np.einsum("bz,bz->b", along, mechanism.led(found.inverse, sums.theta))
+    return slips, np.einsum("bzc,kbz->bkc", found.inverse[:, :, places], sums.pull), tuple(pressing)
 
 
 def small_motion(mechanism: Mechanism, revolution: Revolution, theta: Array) -> SmallMotion:
@@ -216,7 +265,7 @@ def small_motion(mechanism: Mechanism, revolution: Revolution, theta: Array) -> 
 def crank_inertia(mechanism: Mechanism, revolution: Revolution, theta: Array) -> Array:
     """Inertia (B,) [kg m^2] of all links as the crank feels it in the nominal motion: twice their energy at 1 rad/s."""
     grid, found = smooth(mechanism, revolution)
-    sums = Sums(mechanism, revolution, found, grid, found.inverse[:, :, :1])
+    sums = Sums(mechanism, revolution, found, grid, mechanism.led(found.inverse, grid)[:, :, None])
     for link in mechanism.links:
         sums.add_link(link)
     return between(sums.mass[:, 0, 0], theta)

@@ -9,34 +9,42 @@ from typing import Any
 import numpy as np
 
 from chaosgym.arrays import Array
+from chaosgym.core.matrices import inv, product
 from chaosgym.errors import ParameterError
+from chaosgym.machines.contact_law import damping_for, is_hertzian, with_power
 from chaosgym.machines.file_keys import needed
+from chaosgym.machines.loads import cycle_of
 from chaosgym.machines.machine import TaskDefaults
 from chaosgym.machines.mechanism.beam import beam_link
-from chaosgym.machines.mechanism.clearance import Clearance, opened_by, surface_fields
+from chaosgym.machines.mechanism.file_joints import end_of, ends_of, frictions_of, joints_of, with_motions
 from chaosgym.machines.mechanism.file_parts import (
-    LONGEST,
-    axes_of_joint,
     beam_of,
     bodies_at_ends,
     body_of,
-    check_kind,
     in_space,
     place_of,
     spatial_links,
 )
-from chaosgym.machines.mechanism.forces import STROKE_ANGLES, Force, Gas, Sampled, Spring
-from chaosgym.machines.mechanism.joints import Joint
+from chaosgym.machines.mechanism.forces import STROKE_ANGLES, Along, Force, Gas, SampledForce, Spring, TorsionSpring
+from chaosgym.machines.mechanism.joints import Clearance
 from chaosgym.machines.mechanism.keys import KEYS
 from chaosgym.machines.mechanism.links import Link, rigid_link
 from chaosgym.machines.mechanism.machine import MechanismMachine
 from chaosgym.machines.mechanism.machine_class import machine_of
 from chaosgym.machines.mechanism.mechanism import Mechanism
+from chaosgym.machines.mechanism.motor import motor_of
 from chaosgym.machines.mechanism.nominal import places, revolution_of
 from chaosgym.machines.mechanism.spatial import SpatialMechanism
 from chaosgym.machines.parameters import parameter
 from chaosgym.machines.stated import range_of, state_of, tolerances_of
 from chaosgym.numbers import number
+
+LISTS = ("joint", "motion", "force", "moment", "gas", "spring", "damper", "torsion_spring")
+"""Lists of tables in a file."""
+
+MASS_ANGLES = 72
+"""Crank angles whose mean is the mass that strikes."""
+
 
 STILL = 1e-6
 """Stroke of a piston, as a share of the mechanism's length, below which it stands still."""
@@ -62,8 +70,9 @@ def tables_of(values: Mapping[str, Any], _folder: Path) -> dict[str, Any]:
     if not isinstance(values["link"], dict) or not values["link"]:
         raise ParameterError("[link.NAME] is missing: each link is a table, such as [link.crank]")
     data["link"] = {name: _link_table(name, table) for name, table in values["link"].items()}
-    for path in ("joint", "force", "gas", "spring"):
-        data[path] = [KEYS.checked(path, row) for row in _list(path, values.get(path, []))]
+    for path in LISTS:
+        rows = _list(path, values.get(path, []))
+        data[path] = [KEYS.checked(path, with_power(path, row) if isinstance(row, dict) else row) for row in rows]
     points = [data["ground.points"], *(link["points"] for link in data["link"].values())]
     data["spatial"] = any(len(place) == 3 for some in points for place in some.values())
     return data
@@ -113,78 +122,6 @@ def _link(name: str, table: Mapping[str, Any]) -> Link:
     return beam_link(name, beam_of(f"link.{name}.beam", table["beam"]), ends, angle)
 
 
-def _ends(where: str, row: Mapping[str, Any]) -> list[tuple[str, str]]:
-    (between,) = needed(where, row, "between")
-    if len(between) != 2:
-        raise ParameterError(f"{where}.between names {len(between)} points; allowed: two")
-    return [_end(f"{where}.between", each) for each in between]
-
-
-def _end(where: str, text: str) -> tuple[str, str]:
-    link, dot, point = text.partition(".")
-    if not (link and dot and point):
-        raise ParameterError(f"{where} = {text!r} is no point; allowed: LINK.POINT, such as 'crank.pin'")
-    return link, point
-
-
-def _clearance(name: str, kind: str, row: Mapping[str, Any], spatial: bool) -> Clearance | None:
-    """Clearance of a joint, if it has one."""
-    where = f"joint {name}"
-    if "clearance" not in row:
-        for key in ("stiffness", "damping", "hertz_stiffness", "hertz_damping", "friction", "radius", "stations"):
-            if key in row:
-                raise ParameterError(f"{where} has {key} and no clearance; allowed: both, or none")
-        return None
-    hertz = "hertz_stiffness" in row or "hertz_damping" in row
-    for key in ("stiffness", "damping"):
-        if hertz and key in row:
-            raise ParameterError(f"{where} has {key} and is Hertzian; allowed: hertz_{key} in place of {key}")
-    gap, stiffness, damping = map(float, needed(where, row, *surface_fields(hertz)))
-    stations = tuple(number(f"{where}.stations", at, -LONGEST, LONGEST, "m") for at in row.get("stations", ()))
-    if stations and len(set(stations)) < 2:
-        raise ParameterError(
-            f"{where}.stations are at one place; allowed: two or more, or none for a guide without tilt"
-        )
-    found = Clearance(gap, stiffness, damping, stations, row.get("friction"), hertz, row.get("radius"))
-    if found.radius == 0.0:
-        raise ParameterError(
-            f"{name}_radius = 0 m leaves the friction of a pin without moment; allowed: above 0, or neither friction "
-            "nor radius"
-        )
-    for what, (value, about) in found.fields.items():
-        number(f"{name}_{what}", value, about["low"], about["high"], about["unit"].strip("-"))
-    try:
-        opened_by(kind, found, spatial)
-    except ParameterError as error:
-        raise ParameterError(f"{where}: {error}") from None
-    return found
-
-
-def _joints(rows: list[dict[str, Any]], spatial: bool) -> tuple[list[Joint], dict[str, Clearance]]:
-    joints: list[Joint] = []
-    clearances: dict[str, Clearance] = {}
-    for row in rows:
-        (name,) = needed("joint", row, "name")
-        if any(name == joint.name for joint in joints):
-            raise ParameterError(f"two [[joint]] have the name {name!r}; allowed: a name of its own for each")
-        where = f"joint {name}"
-        (kind,) = needed(where, row, "kind")
-        first, second = _ends(where, row)
-        check_kind(where, kind, row, spatial)
-        clearance = _clearance(name, kind, row, spatial)
-        driven = row.get("driven", False)
-        if driven and clearance:
-            raise ParameterError(f"{where} is driven and has clearance; allowed: one of them")
-        if clearance:
-            clearances[name] = clearance
-        angles = (math.radians(row.get(key, 0.0)) for key in ("axis", "turn"))
-        axis, turn = angles
-        opened = opened_by(kind, clearance, spatial) if clearance else ()
-        axes = axes_of_joint(where, kind, row) if spatial else ((), ())
-        joints.append(Joint(name, kind, first, second, axis, "", opened, driven, turn, *axes))
-    return joints, clearances
-
-
 def _direction(angle: float, mechanism: Mechanism) -> Array:
     """Unit vector at an angle [deg] from the x axis on, in the plane of x and y."""
     vector = np.zeros(mechanism.dimensions)
@@ -193,61 +130,120 @@ def _direction(angle: float, mechanism: Mechanism) -> Array:
 
 
 def _force(row: Mapping[str, Any], mechanism: Mechanism) -> Force:
-    at, values = needed("force", row, "at", "force")
-    return Force(_end("force.at", at), Sampled(np.asarray(values), _direction(row.get("direction", 0.0), mechanism)).at)
+    at, given = needed("force", row, "at", "force")
+    if len(given) == mechanism.dimensions:
+        size, angle = math.hypot(*given), math.degrees(math.atan2(given[1], given[0]))
+        raise ParameterError(
+            f"force.force has {len(given)} numbers, as a vector; allowed: one along a direction, as in force = "
+            f'"{size:g} N", direction = "{angle:g} deg", or at least {1 + mechanism.dimensions} samples of a revolution'
+        )
+    cycle = cycle_of("force", row, "force", "N", constant=True)
+    direction = _direction(row.get("direction", 0.0), mechanism)
+    return Force(end_of("force.at", at), Along(cycle, direction).at, note=cycle.note(f"the force at {at}", "N"))
+
+
+def _moment(row: Mapping[str, Any], mechanism: Mechanism) -> Force:
+    at, _ = needed("moment", row, "at", "moment")
+    _refuse_space("moment", mechanism)
+    cycle = cycle_of("moment", row, "moment", "N m", constant=True)
+    only = Along(cycle, np.ones(1)).at
+    return Force(end_of("moment.at", at), only, turns=True, note=cycle.note(f"the moment at {at}", "N m"))
+
+
+def _refuse_space(table: str, mechanism: Mechanism) -> None:
+    if mechanism.dimensions > 2:
+        raise ParameterError(f"[[{table}]] acts in the plane; allowed: in a file whose points have no z")
 
 
 def _gas(row: Mapping[str, Any], mechanism: Mechanism) -> Force:
     """Force of the gas on the piston along its nominal stroke."""
     at, bore, dead, low, high = needed("gas", row, "at", "bore", "dead_volume", "suction", "discharge")
-    number("gas.bore", bore, 1e-4, 10.0, "m")
-    number("gas.dead_volume", dead, 1e-3, 100.0)
-    number("gas.suction", low, 0.0, 1e9, "Pa")
     number("gas.discharge", high, low, 1e9, "Pa")
-    exponent = number("gas.exponent", row.get("exponent", 1.3), 0.5, 3.0)
-    behind = number("gas.behind", row.get("behind", low), 0.0, 1e9, "Pa")
-    gas = Gas(math.pi / 4.0 * bore**2, dead, low, high, behind, exponent)
-    direction, point = _direction(row.get("direction", 0.0), mechanism), _end("gas.at", at)
+    gas = Gas(math.pi / 4.0 * bore**2, dead, low, high, row.get("behind", low), row.get("exponent", 1.3))
+    direction, point = _direction(row.get("direction", 0.0), mechanism), end_of("gas.at", at)
     theta: Any = np.arange(STROKE_ANGLES) * (2.0 * math.pi / STROKE_ANGLES)
     revolution = revolution_of(mechanism)
-    place = mechanism.point(places(mechanism, revolution, theta), point)[0] @ direction
+    place = product(mechanism.point(places(mechanism, revolution, theta), point)[0], direction)
     if not np.ptp(place) > STILL * revolution.length:
         raise ParameterError(
             f"[[gas]] at {at} has no stroke in its direction; allowed: a point that moves as the gas is compressed"
         )
-    return Force(point, Sampled(gas.force(place), direction).at)
+    return Force(point, SampledForce(gas.force(place), direction).at)
 
 
 def _spring(row: Mapping[str, Any]) -> Spring:
-    first, second = _ends("spring", row)
+    first, second = ends_of("spring", row)
     stiffness, length = needed("spring", row, "stiffness", "free_length")
-    number("spring.stiffness", stiffness, 0.0, 1e12, "N/m")
-    number("spring.free_length", length, 0.0, LONGEST, "m")
-    return Spring(
-        first, second, stiffness, length, number("spring.damping", row.get("damping", 0.0), 0.0, 1e9, "N s/m")
-    )
+    length -= _preload("spring", row, stiffness)
+    return Spring(first, second, stiffness, length, row.get("damping", 0.0))
+
+
+def _preload(table: str, row: Mapping[str, Any], stiffness: float) -> float:
+    """What the preload of a spring takes from its free length or angle."""
+    load = float(row.get("preload", 0.0))
+    if load and not stiffness > 0.0:
+        raise ParameterError(f"{table}.preload needs {table}.stiffness above 0")
+    return load / stiffness if load else 0.0
+
+
+def _damper(row: Mapping[str, Any]) -> Spring:
+    first, second = ends_of("damper", row)
+    return Spring(first, second, 0.0, 0.0, *needed("damper", row, "damping"))
+
+
+def _torsion(row: Mapping[str, Any], mechanism: Mechanism) -> TorsionSpring:
+    first, second = ends_of("torsion_spring", row)
+    _refuse_space("torsion_spring", mechanism)
+    mechanism.places(first), mechanism.places(second)
+    if "stiffness" not in row and "damping" not in row:
+        raise ParameterError("[torsion_spring] lacks stiffness; allowed without one: damping")
+    stiffness = row.get("stiffness", 0.0)
+    angle = math.radians(row.get("free_angle", 0.0)) - _preload("torsion_spring", row, stiffness)
+    return TorsionSpring(first, second, stiffness, angle, row.get("damping", 0.0))
 
 
 def mechanism_of(data: Mapping[str, Any]) -> tuple[Mechanism, dict[str, Clearance]]:
     """Mechanism of the tables of a file, and the clearances of its joints by their names."""
     spatial, ground = data["spatial"], data["ground"]
-    joints, clearances = _joints(data["joint"], spatial)
+    joints, clearances = joints_of(data["joint"], spatial)
+    joints = with_motions(data["motion"], joints)
     points, kind = data["ground.points"], SpatialMechanism if spatial else Mechanism
     if spatial:
         points = {name: in_space(place) for name, place in points.items()}
         links = spatial_links(data["link"], joints)
     else:
         links = tuple(_link(name, table) for name, table in data["link"].items())
-    springs = tuple(map(_spring, data["spring"]))
+    springs = (*map(_spring, data["spring"]), *map(_damper, data["damper"]))
     still = kind(links, tuple(joints), points, springs=springs)
-    gravity = number("ground.gravity", ground.get("gravity", 0.0), 0.0, 1e6, "m/s^2")
-    pull = tuple((gravity * _direction(ground.get("gravity_direction", -90.0), still)).tolist())
+    pull = tuple((ground.get("gravity", 0.0) * _direction(ground.get("gravity_direction", -90.0), still)).tolist())
     for spring in springs:
         still.places(spring.first), still.places(spring.second)
-    forces = tuple(_force(row, still) for row in data["force"]) + tuple(_gas(row, still) for row in data["gas"])
+    makers = ("force", _force), ("moment", _moment), ("gas", _gas)
+    forces = tuple(make(row, still) for table, make in makers for row in data[table])
     for force in forces:
         still.places(force.point)
-    return replace(still, gravity=pull, forces=forces), clearances
+    torsion = tuple(_torsion(row, still) for row in data["torsion_spring"])
+    return replace(still, gravity=pull, forces=forces, torsion=torsion), clearances
+
+
+def _with_restitution(
+    rows: list[dict[str, Any]], mechanism: Mechanism, clearances: Mapping[str, Clearance]
+) -> dict[str, Clearance]:
+    """Clearances whose linear surfaces have the damper that restores the stated share of the speed of an impact.
+
+    The mass that strikes is what resists a short push, the mean over a revolution and the directions of a pin.
+    """
+    found = dict(clearances)
+    for row in rows:
+        if "restitution" not in row or is_hertzian(row) or row["name"] not in found:
+            continue
+        name, restored = row["name"], number(f"joint {row['name']}.restitution", row["restitution"], 1e-3, 1.0)
+        machine = machine_of(mechanism, clearances, monitored=name)()
+        mobile = inv(machine.equations(0.0, MASS_ANGLES).mass)
+        pushed = np.concatenate([contact.row for contact in machine.contacts if contact.reading.any()])
+        mass = 1.0 / float(np.mean(np.einsum("ri,bij,rj->br", pushed, mobile, pushed)))
+        found[name] = found[name]._replace(damping=damping_for(restored, mass, found[name].stiffness))
+    return found
 
 
 def built(path: str, digest: str, data: Mapping[str, Any], _folder: Path) -> type[MechanismMachine]:
@@ -261,16 +257,14 @@ def built(path: str, digest: str, data: Mapping[str, Any], _folder: Path) -> typ
     operation = data["operation"]
     speed, *ends = needed("operation", operation, "speed", "speed_range", "clearance_range")
     mechanism, clearances = mechanism_of(data)
-    motor = (
-        (*needed("motor", data["motor"], "stall_torque", "no_load_speed"), data["motor"].get("inertia", 0.0))
-        if data["motor"] is not None
-        else None
-    )
+    clearances = _with_restitution(data["joint"], mechanism, clearances)
+    motor = motor_of(data["motor"]) if data["motor"] is not None else None
     made = machine_of(
         mechanism,
         clearances,
         monitored=operation.get("monitored", ""),
         motor=motor,
+        frictions=frictions_of(data["joint"], data["spatial"]),
         about={"provenance": "stated", "source": path},
         namespace={"name": path, "__doc__": data[""].get("title", path)},
         definition=parameter(digest, choices=(digest,), provenance="stated", source=path),

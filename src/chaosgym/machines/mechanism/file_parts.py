@@ -9,19 +9,14 @@ import numpy as np
 from chaosgym.errors import ParameterError
 from chaosgym.machines.file_keys import needed
 from chaosgym.machines.mechanism.beam import END, START
-from chaosgym.machines.mechanism.joints import GROUND, KINDS, SPATIAL_KINDS, Joint
-from chaosgym.machines.mechanism.links import Beam, Body, Link
+from chaosgym.machines.mechanism.joints import GROUND, KINDS, SPATIAL_KINDS, LinkJoint
+from chaosgym.machines.mechanism.keys import HEAVIEST
+from chaosgym.machines.mechanism.links import MOST_MODES, Beam, Body, Link
 from chaosgym.machines.mechanism.space import SpatialBody, spatial_link
 from chaosgym.machines.mechanism.spatial_beam import spatial_beam_link
-from chaosgym.numbers import number
+from chaosgym.numbers import number, whole
 
 T = TypeVar("T")
-
-MOST_MODES = 12
-"""Modes that a beam may keep, in each plane."""
-
-HEAVIEST, LONGEST = 1e9, 1e6
-"""Most mass [kg] and distance [m] that a file may state."""
 
 
 def _section(where: str, row: Mapping[str, Any]) -> tuple[float, float, float]:
@@ -29,30 +24,19 @@ def _section(where: str, row: Mapping[str, Any]) -> tuple[float, float, float]:
     if "diameter" in row:
         if "width" in row or "height" in row:
             raise ParameterError(f"{where} has a diameter and a width or height; allowed: one of them")
-        d = number(f"{where}.diameter", row["diameter"], 1e-5, 10.0, "m")
+        d = row["diameter"]
         return math.pi * d**2 / 4.0, math.pi * d**4 / 64.0, math.pi * d**4 / 64.0
-    sides = zip(("width", "height"), needed(where, row, "width", "height"), strict=True)
-    b, h = (number(f"{where}.{name}", side, 1e-5, 10.0, "m") for name, side in sides)
+    b, h = needed(where, row, "width", "height")
     return b * h, b * h**3 / 12.0, h * b**3 / 12.0
 
 
 def beam_of(where: str, row: Mapping[str, Any]) -> Beam:
     """A beam."""
     length, modulus, density, modes = needed(where, row, "length", "youngs_modulus", "density", "modes")
-    if not 1 <= modes <= MOST_MODES:
-        raise ParameterError(f"{where}.modes = {modes} is out of range; allowed: 1 to {MOST_MODES}")
+    whole(f"{where}.modes", modes, 1, MOST_MODES)
     area, second, sideways = _section(where, row)
-    return Beam(
-        number(f"{where}.length", length, 1e-3, 1e3, "m"),
-        area,
-        second,
-        number(f"{where}.youngs_modulus", modulus, 1e5, 1e13, "Pa"),
-        number(f"{where}.density", density, 1.0, 1e5, "kg/m^3"),
-        modes,
-        number(f"{where}.damping_ratio", row.get("damping_ratio", 0.0), 0.0, 10.0),
-        row.get("stretch", True),
-        sideways_moment=sideways,
-    )
+    told = row.get("damping_ratio", 0.0), row.get("stretch", True)
+    return Beam(length, area, second, modulus, density, modes, *told, sideways_moment=sideways)
 
 
 def bodies_at_ends(where: str, table: Mapping[str, Any], bodies: Sequence[T]) -> dict[str, tuple[T, ...]] | None:
@@ -73,7 +57,7 @@ def place_of(where: str, values: Any) -> tuple[float, ...]:
         raise ParameterError(
             f"{where} has {len(values)} numbers; allowed: two, x and y, as in '50, 0 mm', or three in space"
         )
-    return tuple(number(where, value, -LONGEST, LONGEST, "m") for value in values)
+    return tuple(map(float, values))
 
 
 def body_of(where: str, row: Mapping[str, Any]) -> Body:
@@ -92,14 +76,12 @@ def _inertia(where: str, row: Mapping[str, Any], count: int) -> tuple[float, ...
     if len(given) != count:
         what = "one, about the body's centre" if count == 1 else "three, about x, y and z of the link"
         raise ParameterError(f"{where}.inertia has {len(given)} numbers; allowed: {what}")
-    return tuple(number(f"{where}.inertia", value, 0.0, HEAVIEST, "kg m^2") for value in given)
+    return tuple(map(float, given))
 
 
 def _mass(where: str, row: Mapping[str, Any]) -> float:
     (mass,) = needed(where, row, "mass")
-    if not mass > 0.0:
-        raise ParameterError(f"{where}.mass = {mass:g} kg is out of range; allowed: above 0")
-    return number(f"{where}.mass", mass, 0.0, HEAVIEST, "kg")
+    return number(f"{where}.mass", mass, 0.0, HEAVIEST, "kg", inside=True)
 
 
 def in_space(place: tuple[float, ...]) -> tuple[float, float, float]:
@@ -119,7 +101,7 @@ def _spatial_body(where: str, row: Mapping[str, Any]) -> SpatialBody:
     return body
 
 
-def spatial_links(tables: Mapping[str, Any], joints: list[Joint]) -> tuple[Link, ...]:
+def spatial_links(tables: Mapping[str, Any], joints: list[LinkJoint]) -> tuple[Link, ...]:
     """Links in space; each may turn right round about its axis, by default that of its pin on the ground, else z."""
     pins = [joint for joint in joints if joint.kind in ("revolute", "cylindrical")]
     axes = {joint.first[0]: joint.first_axis for joint in pins if joint.second[0] == GROUND}

@@ -1,4 +1,4 @@
-"""What pulls at a mechanism: forces over the crank angle, as samples or of a gas, and springs."""
+"""What pulls at a mechanism: forces and moments over the crank angle, a gas, springs and dampers."""
 
 from collections.abc import Callable
 from typing import NamedTuple
@@ -6,20 +6,31 @@ from typing import NamedTuple
 import numpy as np
 
 from chaosgym.arrays import Array
+from chaosgym.machines.loads import Cycle
 
 STROKE_ANGLES = 1440
 """Crank angles at which the pressure of a cylinder is followed."""
 
 
 class Force(NamedTuple):
-    """A force on a point of a link: ``at`` gives it in ground axes, (B, 2) [N], at crank angles (B,) [rad]."""
+    """A force on a point of a link: ``at`` gives it in ground axes, (B, 2) [N], at crank angles (B,) [rad].
+
+    One that ``turns`` is a moment on the link at the point, (B, 1) [N m], in the plane. ``note`` says what samples
+    leave out.
+    """
 
     point: tuple[str, str]
     at: Callable[[Array], Array]
+    turns: bool = False
+    note: str = ""
 
     def times(self, factor: float) -> "Force":
         """The force times a factor."""
-        return Force(self.point, lambda theta: factor * self.at(theta))
+        return self._replace(at=lambda theta: factor * self.at(theta))
+
+    def parts(self, dimensions: int) -> int:
+        """Its components."""
+        return 1 if self.turns else dimensions
 
 
 class Spring(NamedTuple):
@@ -32,7 +43,28 @@ class Spring(NamedTuple):
     damping: float = 0.0
 
 
-class Sampled(NamedTuple):
+class TorsionSpring(NamedTuple):
+    """A spring and damper between the turns of two links, at their points: N m/rad, free angle [rad], N m s/rad."""
+
+    first: tuple[str, str]
+    second: tuple[str, str]
+    stiffness: float
+    free_angle: float
+    damping: float = 0.0
+
+
+class Along(NamedTuple):
+    """Values over a cycle along a direction (2,)."""
+
+    cycle: Cycle
+    direction: Array
+
+    def at(self, theta: Array) -> Array:
+        """Vectors (B, 2) at crank angles (B,) [rad]."""
+        return np.asarray(self.cycle.at(theta)[:, None] * self.direction)
+
+
+class SampledForce(NamedTuple):
     """Values (s,) at equal steps of the crank angle from 0 on, straight lines between them, along a direction (2,)."""
 
     values: Array

@@ -8,15 +8,20 @@ which a rigid link has none. A point lies at
 with its place rho, shape N and curve C in the axes of the link. In the nominal motion q is zero.
 """
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from typing import Any, NamedTuple
 
 import numpy as np
 
 from chaosgym.arrays import Array
+from chaosgym.core import matrices
+from chaosgym.core.matrices import product
 
 RIGID = 3
 """Coordinates of a rigid link: two places and a turn."""
+
+MOST_MODES = 12
+"""Modes that a beam may keep, in each plane."""
 
 _QUARTER = np.array([[0.0, -1.0], [1.0, 0.0]])
 
@@ -24,18 +29,18 @@ _QUARTER = np.array([[0.0, -1.0], [1.0, 0.0]])
 def rotation(angle: Array) -> Array:
     """Turn of vectors by angles (...,) [rad]: (..., 2, 2)."""
     turn = np.empty((*angle.shape, 2, 2))
-    turn[..., 0, 0] = turn[..., 1, 1] = np.cos(angle)
-    turn[..., 1, 0] = np.sin(angle)
+    turn[..., 0, 0] = turn[..., 1, 1] = matrices.cos(angle)
+    turn[..., 1, 0] = matrices.sin(angle)
     turn[..., 0, 1] = -turn[..., 1, 0]
     return turn
 
 
 def quarter_after(turn: Array) -> Array:
     """Derivative of a turn (..., 2, 2) by its angle."""
-    return np.asarray(turn @ _QUARTER)
+    return np.asarray(product(turn, _QUARTER))
 
 
-class Places(NamedTuple):
+class LinkPlaces(NamedTuple):
     """k points of a link with e elastic coordinates.
 
     Attributes
@@ -57,39 +62,39 @@ class Places(NamedTuple):
 
     def moved(self, z: Array) -> Array:
         """Places on the ground (B, k, 2) at coordinates z (B, 3 + e), whose elastic ones are zero."""
-        return np.asarray(z[:, None, :2] + self.place @ np.swapaxes(rotation(z[:, 2]), -1, -2))
+        return np.asarray(z[:, None, :2] + product(self.place, np.swapaxes(rotation(z[:, 2]), -1, -2)))
 
     def gradient(self, z: Array) -> Array:
         """Derivatives of the places by the coordinates, (B, k, 2, 3 + e)."""
         turn, (count, _, elastic) = rotation(z[:, 2]), self.shape.shape
         gradient = np.zeros((len(z), count, 2, RIGID + elastic))
         gradient[:, :, 0, 0] = gradient[:, :, 1, 1] = 1.0
-        gradient[..., 2] = self.place @ np.swapaxes(quarter_after(turn), -1, -2)
-        gradient[..., RIGID:] = turn[:, None] @ self.shape
+        gradient[..., 2] = product(self.place, np.swapaxes(quarter_after(turn), -1, -2))
+        gradient[..., RIGID:] = product(turn[:, None], self.shape)
         return gradient
 
     def bent(self, z: Array, force: Array) -> Array:
         """Second derivatives of the places times forces (..., B, k, 2), summed over the points: (..., B, z, z)."""
         turn, size = rotation(z[:, 2]), RIGID + self.shape.shape[2]
-        own = force @ turn
+        own = product(force, turn)
         bent = np.zeros((*force.shape[:-2], size, size))
         bent[..., 2, 2] = -np.einsum("...ki,ki->...", own, self.place)
-        bent[..., 2, RIGID:] = np.einsum("...ki,kie->...e", force @ quarter_after(turn), self.shape)
+        bent[..., 2, RIGID:] = np.einsum("...ki,kie->...e", product(force, quarter_after(turn)), self.shape)
         bent[..., RIGID:, 2] = bent[..., 2, RIGID:]
         bent[..., RIGID:, RIGID:] = np.einsum("...ki,kief->...ef", own, self.curve)
         return bent
 
 
-def fixed(place: Array) -> Places:
+def fixed(place: Array) -> LinkPlaces:
     """Points (k, 2) of a link without elastic coordinates."""
     place = np.asarray(place, dtype=float).reshape(-1, 2)
     count = len(place)
-    return Places(place, np.zeros((count, 2, 0)), np.zeros((count, 0)), np.zeros((count, 2, 0, 0)))
+    return LinkPlaces(place, np.zeros((count, 2, 0)), np.zeros((count, 0)), np.zeros((count, 2, 0, 0)))
 
 
-def together(some: list[Places]) -> Places:
+def together(some: list[LinkPlaces]) -> LinkPlaces:
     """Points of one link in a row."""
-    return Places(*(np.concatenate(parts) for parts in zip(*some, strict=True)))
+    return LinkPlaces(*(np.concatenate(parts) for parts in zip(*some, strict=True)))
 
 
 class Body(NamedTuple):
@@ -143,7 +148,7 @@ class Link(NamedTuple):
     name
         How joints name it.
     points
-        One point each, by name: ``Places``, or ``SpatialPlaces``.
+        One point each, by name: ``LinkPlaces``, or ``SpatialPlaces``.
     masses
         Where its particles are, likewise.
     mass, inertia : (k,)
@@ -160,6 +165,8 @@ class Link(NamedTuple):
         Coordinates of the link apart from elastic ones: in the plane or in space.
     turning : (3, z, z)
         In space, of bodies whose mass lies along each axis of the link: sum m du^T du of the unit vectors u there.
+    remade
+        The same link of another ``beam``, if it bends.
     """
 
     name: str
@@ -174,6 +181,7 @@ class Link(NamedTuple):
     beam: Beam | None = None
     rigid: int = RIGID
     turning: Array = np.zeros((3, 0, 0))
+    remade: "Callable[[Beam], Link] | None" = None
 
     @property
     def size(self) -> int:
@@ -207,12 +215,12 @@ def inertia_of(link: Link) -> Inertia:
     still, places, count = np.zeros((1, link.size)), link.masses, len(link.mass)
     motion = places.gradient(still)[0]
     unit = np.broadcast_to(np.eye(2)[:, None], (2, count, 2))
-    pushed = link.mass[:, None] * np.concatenate([unit, [places.place @ _QUARTER.T, places.place]])
+    pushed = link.mass[:, None] * np.concatenate([unit, [product(places.place, _QUARTER.T), places.place]])
     row = np.hstack([np.zeros((count, 2)), np.ones((count, 1)), places.slope])
     return Inertia(
         np.einsum("k,kiz,kiy->zy", link.mass, motion, motion),
         np.einsum("k,kiz,ij,kjy->zy", link.mass, motion, _QUARTER, motion),
-        row.T @ (link.inertia[:, None] * row),
+        product(row.T, link.inertia[:, None] * row),
         np.einsum("fki,kiz->fz", pushed, motion),
         places.bent(still, pushed[:, None])[:, 0],
     )

@@ -18,10 +18,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from chaosgym.arrays import Array
+from chaosgym.core.matrices import product
 from chaosgym.errors import ParameterError
-from chaosgym.machines.mechanism.forces import Force, Spring
-from chaosgym.machines.mechanism.joints import ACROSS, ALONG, GROUND, TURN, Joint, Row
-from chaosgym.machines.mechanism.links import Link, Places, fixed, quarter_after, rotation
+from chaosgym.machines.loads import Cycle
+from chaosgym.machines.mechanism.forces import Force, Spring, TorsionSpring
+from chaosgym.machines.mechanism.joints import ACROSS, ALONG, FREE, GROUND, MESH, TURN, LinkJoint, Row
+from chaosgym.machines.mechanism.links import Link, LinkPlaces, fixed, quarter_after, rotation
 
 
 @dataclass(frozen=True, eq=False)
@@ -36,8 +38,8 @@ class Mechanism:
         Points of the ground [m].
     gravity
         Acceleration [m/s^2].
-    forces, springs
-        What else pulls.
+    forces, springs, torsion
+        What else pulls and, in the plane, turns.
 
     Raises
     ------
@@ -46,11 +48,12 @@ class Mechanism:
     """
 
     links: tuple[Link, ...]
-    joints: tuple[Joint, ...]
+    joints: tuple[LinkJoint, ...]
     ground: Mapping[str, tuple[float, ...]]
     gravity: tuple[float, ...] = (0.0, 0.0)
     forces: tuple[Force, ...] = ()
     springs: tuple[Spring, ...] = ()
+    torsion: tuple[TorsionSpring, ...] = ()
     dimensions: ClassVar[int] = 2
     motions_of_a_link: ClassVar[int] = 3
     at: Mapping[str, slice] = field(init=False, repr=False)
@@ -65,16 +68,18 @@ class Mechanism:
             start += link.size
         object.__setattr__(self, "at", at)
         drivers = [joint for joint in self.joints if joint.driven]
-        if len(drivers) != 1:
+        if len(drivers) != 1 and (drivers or not any(joint.moves for joint in self.joints)):
             which = ", ".join(joint.name for joint in drivers) or "none"
             raise ParameterError(f"{len(drivers)} joints are driven ({which}); allowed: one")
-        if drivers[0].kind != "revolute":
-            raise ParameterError(f"joint {drivers[0].name} is driven and {drivers[0].kind}; allowed: revolute")
+        if drivers and drivers[0].kind != "revolute":
+            raise ParameterError(
+                f"joint {drivers[0].name} is driven and {drivers[0].kind}; allowed: revolute, or a [[motion]] of it"
+            )
         for joint in self.joints:
             self._check(joint)
         self._count()
 
-    def _check(self, joint: Joint) -> None:
+    def _check(self, joint: LinkJoint) -> None:
         for end in (joint.first, joint.second):
             self.places(end)
         if joint.measured_in not in (*self.at, GROUND):
@@ -89,11 +94,11 @@ class Mechanism:
         """Refuse what does not have mobility one."""
         held = {joint.name: len(joint.rows) for joint in self.joints}
         mobility = self.motions_of_a_link * len(self.links) - sum(held.values())
-        if mobility != 1:
+        if mobility != self.lead:
             listed = ", ".join(f"{name} {rows}" for name, rows in held.items())
             raise ParameterError(
                 f"the mechanism has mobility {mobility}: {len(self.links)} links with {self.motions_of_a_link} "
-                f"motions each, less what the joints hold ({listed}); allowed: 1{self._idle_spins()}"
+                f"motions each, less what the joints hold ({listed}); allowed: {self.lead}{self._idle_spins()}"
             )
 
     def _idle_spins(self) -> str:
@@ -109,15 +114,42 @@ class Mechanism:
                 )
         return told
 
-    @property
+    @cached_property
     def size(self) -> int:
         """Number of coordinates of all links."""
         return sum(link.size for link in self.links)
 
     @property
-    def driver(self) -> Joint:
-        """The driven joint."""
-        return next(joint for joint in self.joints if joint.driven)
+    def driver(self) -> LinkJoint:
+        """The driven joint, or the first one whose motion is prescribed."""
+        return next(
+            (joint for joint in self.joints if joint.driven), next(j for j in self.joints if j.driven or j.moves)
+        )
+
+    @property
+    def lead(self) -> int:
+        """How many functions of the driven joint stand before ``rows``: 1, or 0 where none is driven."""
+        return sum(joint.driven for joint in self.joints)
+
+    @cached_property
+    def prescribed(self) -> tuple[tuple[int, Cycle], ...]:
+        """Which functions are a motion over the crank angle, and that motion."""
+        rows = enumerate(self.rows(), self.lead)
+        return tuple((k, row.joint.moves) for k, row in rows if row.joint.moves and row.motion == FREE[row.joint.kind])
+
+    def pace(self, theta: Array) -> Array:
+        """Derivatives (B, z) of the functions' values by the crank angle, at crank angles (B,)."""
+        found = np.zeros((len(theta), self.size))
+        found[:, : self.lead] = 1.0
+        for k, cycle in self.prescribed:
+            found[:, k] = cycle.slope(theta)
+        return found
+
+    def led(self, inverse: Array, theta: Array) -> Array:
+        """Derivatives (B, z) of the coordinates by the crank angle, of the inverse (B, z, z) of A."""
+        if not self.prescribed:
+            return np.asarray(inverse[:, :, 0])
+        return np.asarray(product(inverse, self.pace(theta)[:, :, None])[:, :, 0])
 
     def spin(self, name: str) -> int:
         """The coordinate of a link in which it may turn right round."""
@@ -160,7 +192,7 @@ class Mechanism:
         """Columns of places and turns of all links."""
         return np.delete(np.arange(self.size), self.elastic)
 
-    def places(self, end: tuple[str, str]) -> Places:
+    def places(self, end: tuple[str, str]) -> LinkPlaces:
         """A point of a link or of the ground.
 
         Raises
@@ -178,7 +210,7 @@ class Mechanism:
             raise ParameterError(f"{name} has no point {point!r}; known: {', '.join(known) or 'none'}")
         return self._still(point) if name == GROUND else self.link(name).points[point]
 
-    def _still(self, point: str) -> Places:
+    def _still(self, point: str) -> LinkPlaces:
         """A point of the ground."""
         return fixed(np.array(self.ground[point]))
 
@@ -202,7 +234,16 @@ class Mechanism:
         (a, da), (b, db) = self.point(z, first), self.point(z, second)
         return b - a, db - da
 
-    def axes(self, z: Array, joint: Joint) -> Array:
+    def turn_of(self, end: tuple[str, str]) -> Array:
+        """Derivatives (z,) of the turn of a link, at a point, by all coordinates: in the plane they are constant."""
+        slope = np.zeros(self.size)
+        if end[0] != GROUND:
+            own = self.at[end[0]]
+            slope[own.start + 2] = 1.0
+            slope[own.start + 3 : own.stop] = self.places(end).slope[0]
+        return slope
+
+    def axes(self, z: Array, joint: LinkJoint) -> Array:
         """Axes (B, 2, 2) along which the point of a joint is measured, in columns."""
         frame = joint.measured_in
         angle = np.zeros(len(z)) if frame == GROUND else z[:, self.at[frame].start + 2]
@@ -212,7 +253,7 @@ class Mechanism:
     def _ends(self) -> "_Ends":
         return _ends_of(self)
 
-    def along(self, z: Array, joint: Joint) -> tuple[Array, Array]:
+    def along(self, z: Array, joint: LinkJoint) -> tuple[Array, Array]:
         """How far [m] the second point lies along a joint's axis, (B,), and its derivatives (B, z)."""
         which = self.joints.index(joint)
         value, slope = self.motions(z)
@@ -227,18 +268,18 @@ class Mechanism:
         which = np.arange(len(ends.turn))
         for sign, link, place, shape in zip((-1.0, 1.0), ends.link, ends.place, ends.shape, strict=True):
             own = turn[:, link]
-            apart += sign * (base[:, link, :2] + (own @ place[..., None])[..., 0])
-            gradient[..., : self.size] += sign * (own @ shape)
+            apart += sign * (base[:, link, :2] + product(own, place[..., None])[..., 0])
+            gradient[..., : self.size] += sign * product(own, shape)
             gradient[:, which, :, ends.spin[link]] += (
-                sign * np.swapaxes(quarter_after(own) @ place[..., None], 0, 1)[..., 0]
+                sign * np.swapaxes(product(quarter_after(own), place[..., None]), 0, 1)[..., 0]
             )
-        axes = turn[:, ends.frame] @ ends.axes
+        axes = product(turn[:, ends.frame], ends.axes)
         value, slope = np.empty((*apart.shape[:2], 3)), np.empty((*apart.shape[:2], 3, self.size + 1))
         back = np.swapaxes(axes, -1, -2)
-        value[..., :2], slope[..., :2, :] = (back @ apart[..., None])[..., 0], back @ gradient
-        across = np.swapaxes(quarter_after(axes), -1, -2) @ apart[..., None]
+        value[..., :2], slope[..., :2, :] = product(back, apart[..., None])[..., 0], product(back, gradient)
+        across = product(np.swapaxes(quarter_after(axes), -1, -2), apart[..., None])
         slope[:, which, :2, ends.spin[ends.frame]] += np.swapaxes(across, 0, 1)[..., 0]
-        value[..., 2], slope[..., 2, : self.size] = z @ ends.slope.T - ends.turn, ends.slope
+        value[..., 2], slope[..., 2, : self.size] = product(z, ends.slope.T) - ends.turn, ends.slope
         return value, slope[..., : self.size]
 
     def functions(self, z: Array, theta: Array) -> tuple[Array, Array]:
@@ -250,7 +291,10 @@ class Mechanism:
         count = len(ends.picked)
         value, slope = np.empty_like(z), np.empty((len(z), self.size, self.size))
         value[:, :count] = every.reshape(len(z), -1)[:, ends.picked]
-        value[:, 0] -= theta
+        if self.lead:
+            value[:, 0] -= theta
+        for k, cycle in self.prescribed:
+            value[:, k] -= cycle.at(theta)
         slope[:, :count] = slopes.reshape(len(z), -1, self.size)[:, ends.picked]
         value[:, count:], slope[:, count:] = z[:, self.elastic], np.eye(self.size)[self.elastic]
         return value, slope
@@ -260,7 +304,7 @@ class Mechanism:
         rows = self.rows()
         for joint in self.joints:
             pulled = np.zeros((*forces.shape[:-1], 2))
-            for k, row in enumerate(rows, 1):
+            for k, row in enumerate(rows, self.lead):
                 if row.joint is joint and row.motion != TURN:
                     pulled[..., (ALONG, ACROSS).index(row.motion)] += forces[..., k]
             turn, frame = self.axes(z, joint), joint.measured_in
@@ -301,6 +345,17 @@ class _Ends(NamedTuple):
     picked: NDArray[np.int64]
 
 
+def _mesh(mechanism: Mechanism, joint: LinkJoint) -> Array:
+    """Path [m] of one pitch circle on the other, by all coordinates (z,)."""
+    first, second = joint.radii
+    first *= MESH[joint.kind]
+    turns = [mechanism.turn_of(end) for end in (joint.first, joint.second)]
+    path = first * turns[0] + second * turns[1]
+    if joint.carrier != GROUND:
+        path[mechanism.at[joint.carrier].start + 2] -= first + second
+    return np.asarray(path)
+
+
 def _ends_of(mechanism: Mechanism) -> _Ends:
     joints, size = mechanism.joints, mechanism.size
     names = [*mechanism.at, GROUND]
@@ -319,10 +374,19 @@ def _ends_of(mechanism: Mechanism) -> _Ends:
             shift[j, [0, 1], [own.start, own.start + 1]] += sign
             slope[j, own.start + 2] += sign
             slope[j, own.start + 3 : own.stop] += sign * places.slope[0]
+        if joint.radii:
+            slope[j] = _mesh(mechanism, joint)
     numbers = {joint.name: 3 * j for j, joint in enumerate(joints)}
     motions = (ALONG, ACROSS, TURN)
-    picked = [numbers[mechanism.driver.name] + 2]
+    picked = [numbers[mechanism.driver.name] + 2] * mechanism.lead
     picked += [numbers[row.joint.name] + motions.index(row.motion) for row in mechanism.rows()]
+    # teeth mesh where links stand as stated at crank angle 0; the crank itself stands at 0
+    stated = np.zeros(size)
+    for each in mechanism.links:
+        stated[mechanism.spin(each.name)] = each.angle
+    for joint in joints:
+        if joint.driven and joint.second[0] != GROUND:
+            stated[mechanism.spin(joint.second[0])] = 0.0
     moving = np.append(np.ones(len(starts)), 0.0)
     return _Ends(
         base=np.append(starts, 0)[:, None] + np.arange(3),
@@ -334,7 +398,9 @@ def _ends_of(mechanism: Mechanism) -> _Ends:
         shift=shift,
         frame=np.array([names.index(joint.measured_in) for joint in joints]),
         axes=rotation(np.array([joint.axis for joint in joints])),
-        turn=np.array([joint.turn for joint in joints]),
+        turn=np.array(
+            [joint.turn if not joint.radii else product(row, stated) for joint, row in zip(joints, slope, strict=True)]
+        ),
         slope=slope,
         picked=np.array(picked),
     )

@@ -2,10 +2,11 @@ r"""Crank of a mechanism under a motor: run-up, mean speed and its swing, stall.
 
 Every gap stays in its middle, so that the crank alone moves, by
 
-    d/dtheta (J + I) w^2 / 2 = T_m (1 - w / w_0) - T_0 - T_1 w
+    d/dtheta (J + I) w^2 / 2 = T_m(w) - T_0 - T_1 w
 
-with the rotor and flywheel J, the inertia I(theta) of all links as the crank feels it, the motor's line from its stall
-torque T_m to its speed without load w_0, and what weight, gas and springs (T_0) and dampers (T_1) take at each angle.
+with the rotor and flywheel J, the inertia I(theta) of all links as the crank feels it, the motor's curve T_m from its
+torque at rest to none at its speed without load, and what weight, gas and springs (T_0) and dampers (T_1) take at each
+angle.
 """
 
 import math
@@ -16,7 +17,8 @@ import numpy as np
 
 from chaosgym.arrays import Array
 from chaosgym.errors import ParameterError
-from chaosgym.numbers import number, whole
+from chaosgym.machines.file_keys import needed
+from chaosgym.numbers import number, numbers, whole
 
 if TYPE_CHECKING:
     from chaosgym.core.motor import Crank
@@ -52,16 +54,56 @@ MOTOR_FIELDS: Mapping[str, dict[str, Any]] = {
 """Fields of the motor: its torque at rest, its speed without load, rotor and flywheel at the crank."""
 
 
+LINE = ((0.0, 1.0), (1.0, 0.0))
+"""Speeds and torques of a straight line, as shares of the speed without load and of the torque at rest."""
+
+
 class Motor(NamedTuple):
-    """A motor with a straight line of torque over speed, and what turns with it.
+    """A motor with a curve of torque over speed, and what turns with it.
 
     ``stall_torque`` [N m] at rest, ``no_load_rate`` [rad/s] at which it gives none, ``inertia`` [kg m^2] of rotor and
-    flywheel at the crank.
+    flywheel at the crank; ``curve``, speeds and torques as shares of the first two.
     """
 
     stall_torque: float
     no_load_rate: float
     inertia: float
+    curve: tuple[tuple[float, ...], tuple[float, ...]] = LINE
+
+
+def motor_of(table: Mapping[str, Any]) -> Motor:
+    """Motor of the table of a file, its speed in rpm.
+
+    Raises
+    ------
+    ParameterError
+        If a key is missing or does not go with the others, or a curve does not go from rest to no torque.
+
+    Examples
+    --------
+    >>> from chaosgym.machines.mechanism.motor import motor_of
+    >>> motor_of({"speeds": [0.0, 800.0, 1000.0], "torques": [20.0, 30.0, 0.0]}).curve
+    ((0.0, 0.8, 1.0), (1.0, 1.5, 0.0))
+    """
+    inertia = table.get("inertia", 0.0)
+    if not {"speeds", "torques"} & set(table):
+        stall, speed = needed("motor", table, "stall_torque", "no_load_speed")
+        return Motor(stall, speed, inertia)
+    for key in ("stall_torque", "no_load_speed"):
+        if key in table:
+            raise ParameterError(f"motor.{key} has no meaning beside motor.speeds and torques; leave it out")
+    rows = needed("motor", table, "speeds", "torques")
+    speeds, torques = numbers("motor.speeds", rows[0], 0.0, FASTEST, "rpm"), numbers("motor.torques", rows[1], 0.0, 1e9)
+    if len(speeds) != len(torques):
+        raise ParameterError(
+            f"motor.speeds has {len(speeds)} numbers and motor.torques {len(torques)}; allowed: as many"
+        )
+    if len(speeds) < 2 or speeds[0] != 0.0 or np.any(np.diff(speeds) <= 0.0):
+        raise ParameterError("motor.speeds is out of range; allowed: two or more numbers that grow from 0 rpm on")
+    if torques[-1] != 0.0 or not np.all(torques[:-1] > 0.0):
+        raise ParameterError("motor.torques is out of range; allowed: above 0 N m, and 0 N m at the last speed")
+    curve = tuple((speeds / speeds[-1]).tolist()), tuple((torques / torques[0]).tolist())
+    return Motor(float(torques[0]), float(speeds[-1]), inertia, curve)
 
 
 class Load(NamedTuple):
@@ -118,7 +160,7 @@ class MotorRun(NamedTuple):
     @property
     def settled_power(self) -> float:
         """Mean power [W] of the last cycle; 0 where it is less than what a settled speed may still change."""
-        # stall torque times speed without load is four times the most power of the line
+        # torque at rest times speed without load is four times the most power of a straight line
         last = float(self.power[-1])
         return last if abs(last) > 4.0 * SETTLED * np.abs(self.power).max() else 0.0
 
@@ -172,19 +214,20 @@ def crank_of(motor: Motor, load: Load) -> "Crank":
     Raises
     ------
     ParameterError
-        If nothing that turns has inertia, or the motor's line is so steep that the speed follows it within a step.
+        If nothing that turns has inertia, or the motor's curve is so steep that the speed follows it within a step.
 
     Examples
     --------
     >>> from chaosgym.machines.mechanism.motor import Load, Motor, crank_of
     >>> free = Load(np.zeros(90), np.zeros(90), np.zeros(90))
-    >>> crank_of(Motor(10.0, 100.0, 0.1), free).slope  # N m s
-    0.1
+    >>> crank_of(Motor(10.0, 100.0, 0.1), free).torques  # N m
+    array([10.,  0.])
     """
     from chaosgym.core.motor import Crank
 
     width = 2.0 * math.pi / len(load.still)
-    slope = motor.stall_torque / motor.no_load_rate
+    rates, torques = np.multiply(motor.no_load_rate, motor.curve[0]), np.multiply(motor.stall_torque, motor.curve[1])
+    slope = float(np.max(-np.diff(torques) / np.diff(rates)))
     inertia = motor.inertia + load.inertia
     still = inertia <= LEAST * inertia.max()
     if still.any():
@@ -195,10 +238,10 @@ def crank_of(motor: Motor, load: Load) -> "Crank":
     if 0.5 * width * slope > inertia.min() * motor.no_load_rate:
         least = 0.5 * width * slope / motor.no_load_rate - load.inertia.min()
         raise ParameterError(
-            f"the motor's line is so steep that the speed follows it within {math.degrees(width):g} deg; "
+            f"the motor's curve is so steep that the speed follows it within {math.degrees(width):g} deg; "
             f"allowed: [motor] inertia from {least:.2g} kg m^2 on"
         )
-    return Crank(inertia, load.still, load.viscous, slope, motor.no_load_rate)
+    return Crank(inertia, load.still, load.viscous, torques, rates)
 
 
 def turn(motor: Motor, load: Load, rate: float = 0.0, cycles: int | None = None) -> MotorRun:
@@ -234,7 +277,7 @@ def turn(motor: Motor, load: Load, rate: float = 0.0, cycles: int | None = None)
     crank = crank_of(motor, load)
     speeds: list[tuple[float, float, float, float]] = []
     while len(speeds) < (MOST_CYCLES if cycles is None else cycles):
-        stopped, rate, time, work, low, high = call(revolution, *crank, rate)
+        stopped, rate, time, work, low, high = call(revolution, *crank, motor.no_load_rate, rate)
         if stopped != TURNS:
             return _run(speeds, 360.0 * stopped / len(load.still), False)
         speeds.append((2.0 * math.pi / time, low, high, work / time))

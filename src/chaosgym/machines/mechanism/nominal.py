@@ -10,6 +10,8 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from chaosgym.arrays import Array
+from chaosgym.core import matrices
+from chaosgym.core.matrices import product
 from chaosgym.errors import ParameterError
 from chaosgym.machines.mechanism.mechanism import Mechanism
 
@@ -74,7 +76,7 @@ class _Loops:
             before = last
             value, slope = self.mechanism.functions(z, theta)
             try:
-                step[:, held] = np.linalg.solve(self.block(slope), value[:, : len(held), None])[..., 0]
+                step[:, held] = matrices.solve(self.block(slope), value[:, : len(held), None])[..., 0]
             except np.linalg.LinAlgError:
                 return z, np.inf, slope
             last = float(np.max(np.abs(step)))
@@ -85,25 +87,24 @@ class _Loops:
                 break
         return z, last, slope
 
-    def tangent(self, z: Array, slope: Array) -> Array:
-        """Derivatives (B, z) of the coordinates z by the crank angle, of A there."""
-        held = self.mechanism.rigid
-        drive, rate = np.zeros((len(slope), len(held), 1)), np.zeros_like(z)
-        drive[:, 0] = 1.0
-        rate[:, held] = self.scale[held] * np.linalg.solve(self.block(slope), drive)[..., 0]
+    def tangent(self, z: Array, slope: Array, theta: Array) -> Array:
+        """Derivatives (B, z) of the coordinates z by the crank angle (B,), of A there."""
+        held, rate = self.mechanism.rigid, np.zeros_like(z)
+        drive = self.mechanism.pace(theta)[:, : len(held), None]
+        rate[:, held] = self.scale[held] * matrices.solve(self.block(slope), drive)[..., 0]
         return self.mechanism.rates(z, rate)
 
     def inverse(self, slope: Array) -> tuple[Array, Array]:
         """Inverse (B, z, z) of A, and the condition number (B,) of its part of ``block``, in Frobenius' norm."""
         held, bent = self.mechanism.rigid, self.mechanism.elastic
         block = self.block(slope)
-        own = np.linalg.inv(block)
+        own = matrices.inv(block)
         condition = np.prod([np.linalg.norm(each, axis=(1, 2)) for each in (block, own)], axis=0)
         own *= self.scale[held, None]
         inverse, count = np.zeros_like(slope), len(held)
         inverse[:, held, :count] = own
         if len(bent):
-            inverse[:, held, count:] = -own @ slope[:, :count, bent]
+            inverse[:, held, count:] = product(-own, slope[:, :count, bent])
             inverse[:, bent, np.arange(count, len(self.scale))] = 1.0
         return inverse, np.asarray(condition)
 
@@ -125,7 +126,7 @@ def _refuse_singular(loops: _Loops, z: Array, theta: float) -> None:
     if sizes[-1] > sizes[0] / WORST:
         return
     weight = np.abs(left[:, -1])
-    names = ["the drive", *map(str, mechanism.rows())]
+    names = [*["the drive"] * mechanism.lead, *map(str, mechanism.rows())]
     involved = [name for name, share in zip(names, weight, strict=False) if share > 0.1 * weight.max()]
     raise ParameterError(
         f"at crank angle {_degrees(theta)} the mechanism can't move, or moves in two ways: {', '.join(involved)} "
@@ -142,12 +143,12 @@ def _start(loops: _Loops) -> Array:
         z[0, mechanism.spin(link.name)] = link.angle
         places += range(mechanism.at[link.name].start, mechanism.spin(link.name))
     value, slope = mechanism.functions(z, theta)
-    z[0, places] -= np.linalg.lstsq(slope[0][:, places], value[0], rcond=None)[0]
+    z[0, places] -= product(matrices.pinv(slope[0][:, places]), value[0])
     found, last, _ = loops.solve(z, theta)
     if last > CLOSED:
         _refuse_singular(loops, z, 0.0)
         value, _ = mechanism.functions(found, theta)
-        names = ["the drive", *map(str, mechanism.rows())]
+        names = [*["the drive"] * mechanism.lead, *map(str, mechanism.rows())]
         worst = [name for name, gap in zip(names, np.abs(value[0]), strict=False) if gap > 0.3 * np.abs(value[0]).max()]
         raise ParameterError(
             f"the loop does not close at crank angle 0: {', '.join(worst)} stay apart by "
@@ -183,7 +184,7 @@ def revolution_of(mechanism: Mechanism) -> Revolution:
     """
     loops = _Loops(mechanism)
     angles, places = [0.0], [_start(loops)]
-    tangents = [loops.tangent(places[0], loops.solve(places[0], np.zeros(1), 1)[2])]
+    tangents = [loops.tangent(places[0], loops.solve(places[0], np.zeros(1), 1)[2], np.zeros(1))]
     step = STEP
     while angles[-1] < 2.0 * np.pi:
         end = min(angles[-1] + step, 2.0 * np.pi)
@@ -201,7 +202,7 @@ def revolution_of(mechanism: Mechanism) -> Revolution:
             continue
         angles.append(float(theta[0]))
         places.append(z)
-        tangents.append(loops.tangent(z, slope))
+        tangents.append(loops.tangent(z, slope, theta))
         step = min(2.0 * step, STEP)
     drift = places[-1][0] - places[0][0]
     turns = np.zeros(mechanism.size)
@@ -209,8 +210,9 @@ def revolution_of(mechanism: Mechanism) -> Revolution:
         turns[turn] = np.round(drift[turn] / (2.0 * np.pi))
     if np.max(np.abs(drift - 2.0 * np.pi * turns) / loops.scale) > 1e-6:
         raise ParameterError(
-            "the mechanism does not come back after a revolution of the crank: its links pass a dead centre; allowed: "
-            "a motion that repeats with every revolution"
+            "the mechanism does not come back after a revolution of the crank: its links pass a dead centre, or a gear "
+            "or belt turns a link by a part of a turn (let its slow shaft be driven); allowed: a motion that repeats "
+            "with every revolution"
         )
     if len(mechanism.links) > 1 and np.sum(np.ptp(np.concatenate(places), axis=0) / loops.scale > CLOSED) <= 1:
         raise ParameterError(
@@ -264,7 +266,7 @@ def refined(mechanism: Mechanism, revolution: Revolution, theta: Array) -> Revol
     loops, ends = _Loops(mechanism), np.append(theta, 2.0 * np.pi)
     z = _closed(loops, revolution, ends)[0]
     z, _, slope = loops.solve(z, ends, 1)
-    return revolution._replace(theta=ends, z=z, tangent=loops.tangent(z, slope))
+    return revolution._replace(theta=ends, z=z, tangent=loops.tangent(z, slope, ends))
 
 
 def _unwound(z: Array, theta: Array, where: Array, revolution: Revolution) -> Array:

@@ -3,16 +3,18 @@
 from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 from functools import lru_cache
-from typing import TYPE_CHECKING, Any, ClassVar
+from typing import TYPE_CHECKING, Any, ClassVar, Self
 
 import numpy as np
 
 from chaosgym.arrays import Array
 from chaosgym.errors import ParameterError
 from chaosgym.machines.binned.machine import BinnedMachine
+from chaosgym.machines.friction_law import FRICTION_FIELDS, Friction
 from chaosgym.machines.mechanism.equations import assembled, crank_inertia
+from chaosgym.machines.mechanism.links import MOST_MODES, Link
 from chaosgym.machines.mechanism.mechanism import Mechanism
-from chaosgym.machines.mechanism.motor import MOTOR_FIELDS, Load, Motor, MotorRun, crank_of, turn
+from chaosgym.machines.mechanism.motor import LINE, MOTOR_FIELDS, Load, Motor, MotorRun, crank_of, turn
 from chaosgym.machines.mechanism.nominal import Revolution, even_angles, places, revolution_of
 from chaosgym.machines.parameters import assumed, parameter
 
@@ -47,12 +49,15 @@ class OpenedMechanism(BinnedMachine):
         rung: {"matrix_update_interval": interval}
         for rung, interval in (("draft", 6.0), ("standard", 2.0), ("fine", 1.0), ("reference", 0.5))
     }
+    model_fields: ClassVar[tuple[str, ...]] = ("matrix_update_interval",)
     stations: ClassVar[Mapping[str, tuple[float, ...]]] = {}
     """Places [m] along a guide at which each joint with clearance can touch."""
-    rubs: ClassVar[str] = ""
-    """Joint with friction, if there is one."""
-    hertz: ClassVar[bool] = False
-    """Whether all contacts are Hertzian."""
+    rubs: ClassVar[tuple[str, ...]] = ()
+    """Joints with friction, with clearance or without."""
+    motor_curve: ClassVar[tuple[tuple[float, ...], tuple[float, ...]]] = LINE
+    """Speeds and torques of its motor, as shares of that without load and of that at rest."""
+    laws: ClassVar[Mapping[str, float]] = {}
+    """Exponent of the penetration of each joint with clearance; LINEAR of a spring and damper."""
 
     mechanism: Mechanism
     displayed: tuple[float, ...] = field(default=(), repr=False)
@@ -67,6 +72,28 @@ class OpenedMechanism(BinnedMachine):
     """Crank angle over which mass, damping and stiffness matrices are held [deg]; divides 360."""
     monitored: str = parameter("", choices=("",), provenance="assumed", source="default")
     """Joint whose motion and force are recorded."""
+
+    @property
+    def model_numbers(self) -> Mapping[str, float]:
+        """Bins, and modes of each link that bends; see ``Machine.model_numbers``."""
+        beams = {link.name: link.beam for link in self.mechanism.links if link.beam is not None}
+        modes = {f"{name}_modes": beam.modes for name, beam in beams.items()}
+        return {**modes, "matrix_update_interval": self.matrix_update_interval}
+
+    @property
+    def finer(self) -> "Self | None":
+        """The machine with bins of half the angle, and twice the modes of links that bend; see ``Machine.finer``."""
+        links = tuple(_with_twice_the_modes(link) for link in self.mechanism.links)
+        bends = any(link.beam is not None for link in links)
+        try:
+            return replace(
+                self,
+                matrix_update_interval=0.5 * self.matrix_update_interval,
+                mechanism=replace(self.mechanism, links=links) if bends else self.mechanism,
+                displayed=() if bends else self.displayed,
+            )
+        except ParameterError:
+            return None
 
     @property
     def clearance_field(self) -> str:
@@ -93,7 +120,7 @@ class OpenedMechanism(BinnedMachine):
         if not self.has_motor:
             return None
         stall, speed, inertia = (float(getattr(self, name)) for name in MOTOR_FIELDS)
-        return Motor(stall, self.rate_at(speed), inertia)
+        return Motor(stall, self.rate_at(speed), inertia, self.motor_curve)
 
     def under_motor(self, cycles: int | None = None, speed: float = 0.0) -> MotorRun:
         """Run the crank under its motor, every gap in its middle; see ``motor.turn``.
@@ -137,19 +164,28 @@ class OpenedMechanism(BinnedMachine):
         return replace(self.mechanism, links=tuple(links), gravity=gravity, forces=forces)
 
     @property
-    def rub(self) -> float:
-        """Coefficient of friction, or 0."""
-        return float(getattr(self, f"{self.rubs}_friction")) if self.rubs else 0.0
+    def frictions(self) -> Mapping[str, Friction]:
+        """Friction of each joint that has some."""
+        parts: dict[str, list[Any]] = {
+            name: [getattr(self, f"{name}_{what}", None) for what in FRICTION_FIELDS] for name in self.rubs
+        }
+        return {name: Friction(*each) for name, each in parts.items()}
 
     @property
-    def lever(self) -> float | None:
-        """Radius [m] of a pin with friction."""
-        radius = getattr(self, f"{self.rubs}_radius", None)
-        return None if radius is None else float(radius)
+    def loose(self) -> tuple[str, ...]:
+        """Joints with clearance and friction."""
+        return tuple(name for name in self.rubs if name in self.laws)
 
     def row_of(self, joint: str, motion: str) -> Array:
         """The coordinate (n,) that is a motion of a joint."""
         return np.array([float(name == f"{joint} {motion}") for name in self.degrees_of_freedom])
+
+
+def _with_twice_the_modes(link: Link) -> Link:
+    """A link that bends in twice as many modes, as far as a beam may keep so many; any other as it is."""
+    if link.beam is None or link.remade is None:
+        return link
+    return link.remade(link.beam._replace(modes=min(2 * link.beam.modes, MOST_MODES)))
 
 
 @lru_cache(maxsize=256)

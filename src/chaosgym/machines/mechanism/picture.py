@@ -14,6 +14,9 @@ from chaosgym.machines.picture import PALE, WILD, Shape, Sketch, Words, draw_sha
 GAP, ROOM = 0.04, 0.14
 """Gap as drawn and space around the mechanism, as shares of its size."""
 
+COIL = 0.05
+"""Half the width of a spring as drawn, as a share of its length."""
+
 AROUND, GHOSTS = 72, 12
 """Crank angles by which the ways of all points are known, and those of them at which pale links are drawn."""
 
@@ -82,6 +85,19 @@ def _links(machine: OpenedMechanism, z: Array) -> list[Shape]:
     return shapes
 
 
+def _springs(machine: OpenedMechanism, z: Array) -> list[Shape]:
+    """Each spring as a zigzag between its points, a damper alone as a straight line."""
+    shapes, shares = [], np.array([0.0, *np.linspace(0.2, 0.8, 8), 1.0])
+    for spring in machine.mechanism.springs:
+        first, second = (machine.mechanism.point(z, end)[0][:, None, :2] for end in (spring.first, spring.second))
+        along = second - first
+        across = COIL * np.stack([-along[..., 1], along[..., 0]], axis=-1) * bool(spring.stiffness)
+        sides = np.array([0.0, 0.0, *3 * (1.0, -1.0), 0.0, 0.0])
+        line = first + shares[:, None] * along + sides[:, None] * across
+        shapes.append(Shape("line", moving(line), width=1.0, alpha=0.7))
+    return shapes
+
+
 def sketch_of_mechanism(record: Any, rows: NDArray[np.int64], force_limit: float) -> Sketch:
     """The links, and the monitored joint's displacement where it is; see ``Machine.sketch``."""
     machine, samples, per_cycle = record.machine, samples_of(record), record.history.shape[1]
@@ -99,6 +115,7 @@ def sketch_of_mechanism(record: Any, rows: NDArray[np.int64], force_limit: float
     shapes = (
         *(Shape("back", line[None, None], PALE, alpha=0.6) for line in pale),
         *_guides(machine, around, size),
+        *_springs(machine, z),
         *_links(machine, z),
         Shape("line", moving(place[:, None] + GAP * size * CIRCLE)),
         Shape("dot", moving(inside[:, None]), None, 7.0),
@@ -135,5 +152,5 @@ def draw_poses(panels: Any, machine: OpenedMechanism) -> None:
             for joint, place in _joint_places(machine, z)
             if joint.opened
         ]
-        draw_shapes(panel, [*behind, *_links(machine, z), *rings, *ground])
+        draw_shapes(panel, [*behind, *_springs(machine, z), *_links(machine, z), *rings, *ground])
         panel.set_title(f"{math.degrees(angle):.0f}°", fontsize=8.5)

@@ -18,6 +18,8 @@ from typing import NamedTuple
 import numpy as np
 
 from chaosgym.arrays import Array
+from chaosgym.core import matrices
+from chaosgym.core.matrices import product
 from chaosgym.errors import ParameterError
 from chaosgym.machines.mechanism.links import Link, rotation
 
@@ -51,7 +53,11 @@ def _series(angle: Array) -> tuple[Array, Array, Array]:
     large = angle > 1e-3
     if np.any(large):
         a = angle[large]
-        first[large], second[large], third[large] = np.sin(a) / a, (1.0 - np.cos(a)) / a**2, (a - np.sin(a)) / a**3
+        first[large], second[large], third[large] = (
+            matrices.sin(a) / a,
+            (1.0 - matrices.cos(a)) / a**2,
+            (a - matrices.sin(a)) / (a * a * a),
+        )
     return first[..., None, None], second[..., None, None], third[..., None, None]
 
 
@@ -59,7 +65,7 @@ def turned_by(vector: Array) -> Array:
     """Rotations (B, 3, 3) by rotation vectors (B, 3) [rad]."""
     first, second, _ = _series(np.linalg.norm(vector, axis=-1))
     across = skew(vector)
-    return np.asarray(np.eye(3) + first * across + second * (across @ across))
+    return np.asarray(np.eye(3) + first * across + second * product(across, across))
 
 
 def axes_of(third: Array, wanted: Array | None = None) -> Array:
@@ -67,11 +73,11 @@ def axes_of(third: Array, wanted: Array | None = None) -> Array:
 
     Without one it is that of the unit vectors that lies most across.
     """
-    unit = third / np.linalg.norm(third)
+    unit = third / matrices.norm(third)
     if wanted is None:
         wanted = np.eye(3)[int(np.argmin(np.abs(unit)))]
-    first = wanted - unit * (unit @ wanted)
-    first = first / np.linalg.norm(first)
+    first = wanted - unit * product(unit, wanted)
+    first = first / matrices.norm(first)
     return np.stack([first, np.cross(unit, first), unit], axis=1)
 
 
@@ -83,18 +89,18 @@ class Lie(NamedTuple):
 
     def turn(self, z: Array) -> Array:
         """R (..., 3, 3) at coordinates z (..., 6)."""
-        return np.asarray(self.before @ _spun(z[..., 3]) @ turned_by(_swing(z[..., 4], z[..., 5])) @ self.after)
+        return np.asarray(product(self.before, _spun(z[..., 3]), turned_by(_swing(z[..., 4], z[..., 5])), self.after))
 
     def moved(self, z: Array, step: Array) -> Array:
         """Coordinates after a small step (..., 6) of the place and about the axes of the world."""
         back = np.swapaxes(self.before, -1, -2)
-        own = back @ turned_by(step[..., 3:]) @ self.turn(z) @ np.swapaxes(self.after, -1, -2)
+        own = product(back, turned_by(step[..., 3:]), self.turn(z), np.swapaxes(self.after, -1, -2))
         across = np.hypot(own[..., 2, 0], own[..., 2, 1])
         straight = across < 1e-12
-        factor = np.where(straight, 1.0, np.arctan2(across, own[..., 2, 2]) / np.where(straight, 1.0, across))
+        factor = np.where(straight, 1.0, matrices.arctan2(across, own[..., 2, 2]) / np.where(straight, 1.0, across))
         swing = _swing(own[..., 2, 1] * factor, -own[..., 2, 0] * factor)
-        spun = own @ turned_by(-swing)
-        spin = np.arctan2(spun[..., 1, 0], spun[..., 0, 0])
+        spun = product(own, turned_by(-swing))
+        spin = matrices.arctan2(spun[..., 1, 0], spun[..., 0, 0])
         spin += 2.0 * np.pi * np.round((z[..., 3] - spin) / (2.0 * np.pi))
         return np.concatenate([z[..., :3] + step[..., :3], spin[..., None], swing[..., :2]], axis=-1)
 
@@ -103,10 +109,10 @@ class Lie(NamedTuple):
         swing = _swing(z[..., 4], z[..., 5])
         _, second, third = _series(np.linalg.norm(swing, axis=-1))
         across = skew(swing)
-        slope = np.eye(3) + second * across + third * (across @ across)
+        slope = np.eye(3) + second * across + third * product(across, across)
         slope[..., 2] = [0.0, 0.0, 1.0]
-        turned = _spun(-z[..., 3]) @ (np.swapaxes(self.before, -1, -2) @ rate[..., 3:, None])
-        own = np.linalg.solve(slope, turned)[..., 0]
+        turned = product(_spun(-z[..., 3]), product(np.swapaxes(self.before, -1, -2), rate[..., 3:, None]))
+        own = matrices.solve(slope, turned)[..., 0]
         return np.concatenate([rate[..., :3], own[..., 2:], own[..., :2]], axis=-1)
 
 
@@ -151,7 +157,7 @@ class SpatialPlaces(NamedTuple):
 
     def moved(self, z: Array) -> Array:
         """Places on the ground (B, k, 3) at coordinates z (B, 6 + e), whose elastic ones are zero."""
-        return np.asarray(z[:, None, :3] + self.place @ np.swapaxes(self.lie.turn(z), -1, -2))
+        return np.asarray(z[:, None, :3] + product(self.place, np.swapaxes(self.lie.turn(z), -1, -2)))
 
     def turned(self, vector: Array) -> tuple[Array, Array]:
         """First and second derivative (3, e) and (3, e, e) by q of a vector (3,) that turns with the first point."""
@@ -218,7 +224,7 @@ def spatial_inertia_of(link: Link) -> SpatialInertia:
     count, size = len(mass), RIGID + elastic
     motion = np.zeros((count, 3, size))
     motion[:, :, :3], motion[:, :, 3:6], motion[:, :, 6:] = np.eye(3), -skew(rho), places.shape
-    carried = (mass[:, None] * motion.reshape(count, -1)).T @ motion.reshape(count, -1)
+    carried = product((mass[:, None] * motion.reshape(count, -1)).T, motion.reshape(count, -1))
     moments = np.moveaxis(carried.reshape(3, size, 3, size), 1, 2)
     # factors of the twelve accelerations, whose direction is the last index but one
     weight = mass[:, None] * np.concatenate([np.ones((count, 1)), rho], axis=1)
@@ -236,16 +242,16 @@ def _bent(places: SpatialPlaces, mass: Array) -> Array:
     size = RIGID + elastic
     weight = mass[:, None] * np.concatenate([np.ones((len(mass), 1)), rho], axis=1)
     bent = np.zeros((4, 3, size, size))
-    product = weight.T @ rho
-    pressed = np.einsum("ai,fb->fiab", np.eye(3), product)
+    outer = product(weight.T, rho)
+    pressed = np.einsum("ai,fb->fiab", np.eye(3), outer)
     bent[..., 3:6, 3:6] = 0.5 * (pressed + np.swapaxes(pressed, -1, -2))
-    bent[..., 3:6, 3:6] -= product[..., None, None] * np.eye(3)
+    bent[..., 3:6, 3:6] -= outer[..., None, None] * np.eye(3)
     if elastic:
-        moved = (weight.T @ places.shape.reshape(len(mass), -1)).reshape(4, 3, elastic)
+        moved = (product(weight.T, places.shape.reshape(len(mass), -1))).reshape(4, 3, elastic)
         # a turn d moves what bends by d x N q
-        bent[..., 3:6, 6:] = -skew(np.eye(3)) @ moved[:, None]
+        bent[..., 3:6, 6:] = product(-skew(np.eye(3)), moved[:, None])
         bent[..., 6:, 3:6] = np.swapaxes(bent[..., 3:6, 6:], -1, -2)
-        curve = weight.T @ places.curve.reshape(len(mass), -1)
+        curve = product(weight.T, places.curve.reshape(len(mass), -1))
         bent[..., 6:, 6:] = curve.reshape(4, 3, elastic, elastic)
     return np.concatenate([bent[0], np.swapaxes(bent[1:], 0, 1).reshape(9, size, size)])
 
@@ -266,8 +272,8 @@ class SpatialBody(NamedTuple):
         """``Link.turning`` (3, 6 + e, 6 + e) of it, where elastic coordinates turn it by ``slope`` (3, e)."""
         found = np.zeros((3, RIGID + slope.shape[1], RIGID + slope.shape[1]))
         for axis, square in enumerate(self.squares):
-            moved = -skew(np.eye(3)[axis]) @ np.hstack([np.eye(3), slope])
-            found[axis, 3:, 3:] = square * moved.T @ moved
+            moved = product(-skew(np.eye(3)[axis]), np.hstack([np.eye(3), slope]))
+            found[axis, 3:, 3:] = product(square * moved.T, moved)
         return found
 
     def particles(self) -> tuple[Array, Array]:
@@ -295,8 +301,8 @@ def lying(orientation: Vector, axis: Vector) -> Lie:
     own = axes_of(np.array(axis))
     lies = np.eye(3)
     for unit, angle in zip(np.eye(3), orientation, strict=True):
-        lies = turned_by(angle * unit[None])[0] @ lies
-    return Lie(lies @ own, own.T)
+        lies = product(turned_by(angle * unit[None])[0], lies)
+    return Lie(product(lies, own), own.T)
 
 
 def spatial_link(

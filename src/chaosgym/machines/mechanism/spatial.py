@@ -19,11 +19,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from chaosgym.arrays import Array
+from chaosgym.core import matrices
+from chaosgym.core.matrices import product
 from chaosgym.errors import ParameterError
-from chaosgym.machines.mechanism.joints import ALONG, GROUND, PLACES, Joint
+from chaosgym.machines.mechanism.joints import ALONG, GROUND, PLACES, LinkJoint
 from chaosgym.machines.mechanism.mechanism import Mechanism
 from chaosgym.machines.mechanism.space import RIGID, Lie, cross, skew, spatially_fixed
-from chaosgym.machines.mechanism.spatial_rows import TURNS, Carried, Rows, Vectors, axes_of_joint
+from chaosgym.machines.mechanism.spatial_rows import TURNS, MovingVectors, Rows, Vectors, axes_of_joint
 
 MOST_SWING = 0.97 * np.pi
 """Angle [rad] by which a link may swing about axes across its own."""
@@ -99,7 +101,7 @@ class SpatialMechanism(Mechanism):
     def refuse_turned_over(self, z: Array) -> None:
         """Refuse coordinates (1, z) in which a link has turned by half a turn about an axis that allows no more."""
         for name, own in self.at.items():
-            if np.linalg.norm(z[0, own.start + 4 : own.start + RIGID]) > MOST_SWING:
+            if matrices.norm(z[0, own.start + 4 : own.start + RIGID]) > MOST_SWING:
                 raise ParameterError(
                     f"link {name} turns by half a turn about another axis than its own; allowed: axis of "
                     f"[link.{name}], about which it turns right round"
@@ -111,10 +113,10 @@ class SpatialMechanism(Mechanism):
         if end[0] == GROUND:
             return np.broadcast_to(places.place[0], (len(z), 3)), gradient
         own, turn = self.at[end[0]], self._turn(z, end[0])
-        arm = turn @ places.place[0]
+        arm = product(turn, places.place[0])
         gradient[:, :, own.start : own.start + 3] = np.eye(3)
         gradient[:, :, own.start + 3 : own.start + RIGID] = -skew(arm)
-        gradient[:, :, own.start + RIGID : own.stop] = turn @ places.shape[0]
+        gradient[:, :, own.start + RIGID : own.stop] = product(turn, places.shape[0])
         return z[:, own.start : own.start + 3] + arm, gradient
 
     def _turn(self, z: Array, name: str) -> Array:
@@ -128,7 +130,7 @@ class SpatialMechanism(Mechanism):
             carried = self._carried([(link, places.place[0], places.shape[0], places.curve[0])])
             self._add_carried(link, self._turn(z, end[0]), carried, force[..., None, :], total)
 
-    def _carried(self, parts: Sequence[tuple[int, Array, Array, Array]]) -> Carried:
+    def _carried(self, parts: Sequence[tuple[int, Array, Array, Array]]) -> MovingVectors:
         """Vectors of links, each with its derivatives by the elastic coordinates of its link."""
         count, bends = len(parts), len(self.elastic)
         shape, curve = np.zeros((count, 3, bends)), np.zeros((count, 3, bends, bends))
@@ -137,29 +139,29 @@ class SpatialMechanism(Mechanism):
                 own = np.flatnonzero(self._bends(link))
                 shape[k][:, own] = once
                 curve[k][np.ix_(np.arange(3), own, own)] = twice
-        return Carried(np.array([part[0] for part in parts]), np.array([part[1] for part in parts]), shape, curve)
+        return MovingVectors(np.array([part[0] for part in parts]), np.array([part[1] for part in parts]), shape, curve)
 
-    def _add_carried(self, link: int, turn: Array, carried: Carried, force: Array, total: Array) -> None:
+    def _add_carried(self, link: int, turn: Array, carried: MovingVectors, force: Array, total: Array) -> None:
         """Add the second derivatives of vectors that a link carries, times forces (..., B, R, 3)."""
         spin, bends = self._spin(link), self._bends(link)
-        arm = carried.vector @ np.swapaxes(turn, -1, -2)
-        product = np.swapaxes(force, -1, -2) @ arm
-        total[..., spin, spin] += 0.5 * (product + np.swapaxes(product, -1, -2))
-        total[..., spin, spin] -= np.einsum("...ii->...", product)[..., None, None] * np.eye(3)
+        arm = product(carried.vector, np.swapaxes(turn, -1, -2))
+        outer = product(np.swapaxes(force, -1, -2), arm)
+        total[..., spin, spin] += 0.5 * (outer + np.swapaxes(outer, -1, -2))
+        total[..., spin, spin] -= np.einsum("...ii->...", outer)[..., None, None] * np.eye(3)
         if not bends.any():
             return
-        columns, own = self.elastic[bends], force @ turn
+        columns, own = self.elastic[bends], product(force, turn)
         count, flat = len(columns), own.reshape(*own.shape[:-2], 1, -1)
         # a turn d moves what bends by d x N q
         crossed = skew(np.swapaxes(carried.shape[..., bends], 1, 2)).transpose(0, 3, 2, 1)
-        mixed = turn @ (flat @ crossed.reshape(-1, 3 * count)).reshape(*own.shape[:-2], 3, count)
+        mixed = product(turn, (product(flat, crossed.reshape(-1, 3 * count))).reshape(*own.shape[:-2], 3, count))
         total[..., spin, columns] += mixed
         total[..., columns, spin] += np.swapaxes(mixed, -1, -2)
         curve = carried.curve[..., bends, :][..., bends]
-        bent = (flat @ curve.reshape(-1, count**2)).reshape(*own.shape[:-2], count, count)
+        bent = (product(flat, curve.reshape(-1, count**2))).reshape(*own.shape[:-2], count, count)
         total[..., columns[:, None], columns] += bent
 
-    def _frame_of(self, joint: Joint) -> Array:
+    def _frame_of(self, joint: LinkJoint) -> Array:
         """Axes in which the point of a joint is measured, in the link that bears them."""
         return axes_of_joint(joint.first_axis if joint.measured_in == joint.first[0] else joint.second_axis)
 
@@ -172,7 +174,7 @@ class SpatialMechanism(Mechanism):
         """Number of the link of a point, and an axis that turns with that point."""
         return self._number(end[0]), axis, *self.places(end).turned(axis)
 
-    def _table(self, motions: Sequence[tuple[Joint, str]]) -> Rows:
+    def _table(self, motions: Sequence[tuple[LinkJoint, str]]) -> Rows:
         """Constants of some motions of joints."""
         axes, starts, ends, moves = [], [], [], []
         for joint, motion in motions:
@@ -197,7 +199,7 @@ class SpatialMechanism(Mechanism):
     def _vectors(self, z: Array, rows: Rows) -> Vectors:
         each = self._each(z)
         turn = self._lies.turn(each)
-        axis, start, end = ((turn[:, one.link] @ one.vector[:, :, None])[..., 0] for one in rows.vectors)
+        axis, start, end = (product(turn[:, one.link], one.vector[:, :, None])[..., 0] for one in rows.vectors)
         apart = end + rows.moves * (each[:, rows.end.link, :3] - each[:, rows.start.link, :3] - start)
         return Vectors(turn, axis, start, end, apart)
 
@@ -216,7 +218,7 @@ class SpatialMechanism(Mechanism):
         if len(self.elastic):
             signed = (apart, -rows.moves * axis, axis)
             parts = zip(signed, rows.vectors, strict=True)
-            own = [((pressed[..., None, :] @ turn[:, one.link]) @ one.shape)[..., 0, :] for pressed, one in parts]
+            own = [product(pressed[..., None, :], turn[:, one.link], one.shape)[..., 0, :] for pressed, one in parts]
             whole[..., self.elastic] = own[0] + own[1] + own[2]
         return whole
 
@@ -232,8 +234,8 @@ class SpatialMechanism(Mechanism):
         value[:, held], slope[:, held] = self._filled(z, self._rows)
         (along, across, sideways), arrow = self._drive
         crank = self.driver.second[0]
-        pointer = self._turn(z, crank) @ arrow
-        turned = np.arctan2(pointer @ sideways, pointer @ across)
+        pointer = product(self._turn(z, crank), arrow)
+        turned = matrices.arctan2(product(pointer, sideways), product(pointer, across))
         value[:, 0] = np.mod(turned - theta + np.pi, 2.0 * np.pi) - np.pi
         slope[:, 0, self._spin(self._number(crank))] = along
         value[:, held.stop :] = z[:, self.elastic]
@@ -245,15 +247,15 @@ class SpatialMechanism(Mechanism):
         """Axes (3, 3) of the driven joint on the ground, in rows, and that of the crank (3,) that lies across it."""
         return axes_of_joint(self.driver.first_axis).T, axes_of_joint(self.driver.second_axis)[:, 1]
 
-    def along(self, z: Array, joint: Joint) -> tuple[Array, Array]:
+    def along(self, z: Array, joint: LinkJoint) -> tuple[Array, Array]:
         """How far [m] the second point lies along a joint's axis, (B,), and its derivatives (B, z)."""
         value, slope = self._filled(z, self._table([(joint, ALONG)]))
         return value[:, 0], slope[:, 0]
 
-    def axes(self, z: Array, joint: Joint) -> Array:
+    def axes(self, z: Array, joint: LinkJoint) -> Array:
         """Axes (B, 3, 3) along which the point of a joint is measured, in columns."""
         turn = self._lies.turn(self._each(z))[:, self._number(joint.measured_in)]
-        return np.asarray(turn @ self._frame_of(joint))
+        return np.asarray(product(turn, self._frame_of(joint)))
 
     def add_bent_rows(self, z: Array, forces: Array, total: Array) -> None:
         """Add the second derivatives of the functions times forces (..., B, z) to ``total`` (..., B, z, z)."""
@@ -268,7 +270,7 @@ class SpatialMechanism(Mechanism):
         for link, name in enumerate(self.at):
             for carried, force in zip(rows.vectors, pressed, strict=True):
                 own = carried.link == link
-                part = Carried(*(each[own] for each in carried))
+                part = MovingVectors(*(each[own] for each in carried))
                 self._add_carried(link, vectors.turn[:, link], part, force[..., own, :], total)
             own = rows.axis.link == link
             if own.any():
@@ -277,11 +279,11 @@ class SpatialMechanism(Mechanism):
                 turning = (factor[..., own, :, None] * gradients[0][:, own][..., columns]).reshape(
                     *factor.shape[:-3], *count, len(columns)
                 )
-                crossed = np.swapaxes(turning, -1, -2) @ apart[:, own].reshape(*count, self.size)
+                crossed = product(np.swapaxes(turning, -1, -2), apart[:, own].reshape(*count, self.size))
                 total[..., columns, :] += crossed
                 total[..., columns] += np.swapaxes(crossed, -1, -2)
 
-    def _gradient(self, turn: Array, carried: Carried, vector: Array) -> Array:
+    def _gradient(self, turn: Array, carried: MovingVectors, vector: Array) -> Array:
         """Derivatives (B, R, 3, z) of vectors that links carry, (B, R, 3) on the ground, by turns and bending."""
         every = np.arange(len(carried.link))
         slope = np.zeros((*vector.shape, len(self.links) + 1, RIGID))
@@ -289,7 +291,7 @@ class SpatialMechanism(Mechanism):
         whole = np.empty((*vector.shape, self.size))
         whole[..., self._rigid] = slope[..., :-1, :]
         if len(self.elastic):
-            whole[..., self.elastic] = turn[:, carried.link] @ carried.shape
+            whole[..., self.elastic] = product(turn[:, carried.link], carried.shape)
         return whole
 
     def _moving(self, link: NDArray[np.int64]) -> Array:

@@ -14,20 +14,24 @@ Bishop, There is more than one way to frame a curve, American Mathematical Month
 
 import math
 from collections.abc import Mapping
+from functools import partial
 
 import numpy as np
 
 from chaosgym.arrays import Array
+from chaosgym.core import matrices
+from chaosgym.core.matrices import product
 from chaosgym.errors import ParameterError
 from chaosgym.machines.beam_element import POINTS
 from chaosgym.machines.mechanism.beam import (
     END,
     START,
     STRETCH,
-    Bending,
+    BendingModes,
     bending_of,
     curvatures,
     elastic_of,
+    parabolas,
     pull_of,
 )
 from chaosgym.machines.mechanism.links import Beam, Link
@@ -45,9 +49,6 @@ Carried = Mapping[str, tuple[SpatialBody, ...]]
 
 FIBRES = 16
 """Fibres around a round section at which stress is told: the largest is missed by 2 % at most."""
-
-_SLOPES = np.linalg.pinv(np.vander(POINTS, 3, increasing=True))
-"""Coefficients of a parabola over an element from its values at the points of integration."""
 
 
 def spatial_beam_link(
@@ -111,6 +112,7 @@ def spatial_beam_link(
         beam,
         RIGID,
         turning,
+        partial(spatial_beam_link, name, ends=ends, orientation=orientation, axis=axis, along=along),
     )
 
 
@@ -126,7 +128,7 @@ def _turning(way: int, ends: Carried, beside: Carried) -> tuple[tuple[float, flo
 
 def _points(
     beam: Beam,
-    planes: tuple[Bending, Bending],
+    planes: tuple[BendingModes, BendingModes],
     lie: Lie,
     along: Array,
     across: list[Array],
@@ -145,7 +147,7 @@ def _points(
     return SpatialPlaces(place, lie, shape, np.zeros_like(shape), curve, np.zeros((count, elastic, elastic)))
 
 
-def _end(beam: Beam, planes: tuple[Bending, Bending], lie: Lie, end: int) -> SpatialPlaces:
+def _end(beam: Beam, planes: tuple[BendingModes, BendingModes], lie: Lie, end: int) -> SpatialPlaces:
     """Start (0) or end (1) of the beam."""
     first, modes = int(beam.stretches), len(planes[0].squares)
     flat = np.zeros((1, modes))
@@ -160,11 +162,11 @@ def _end(beam: Beam, planes: tuple[Bending, Bending], lie: Lie, end: int) -> Spa
     return found
 
 
-def _twist(planes: tuple[Bending, Bending], length: float) -> Array:
+def _twist(planes: tuple[BendingModes, BendingModes], length: float) -> Array:
     """Integrals (m, m) of v' w'' - v'' w' over the beam, of modes v along y and w along z."""
     found = []
     for plane in planes:
-        found.append(np.einsum("ik,ekm->eim", _SLOPES, plane.slope.reshape(-1, len(POINTS), plane.slope.shape[1])))
+        found.append(np.einsum("ik,ekm->eim", parabolas(), plane.slope.reshape(-1, len(POINTS), plane.slope.shape[1])))
     powers = np.arange(3)
     # a slope is a parabola over an element, and the element's length leaves the integral
     sums = np.maximum(powers[:, None] + powers, 1)
@@ -193,5 +195,5 @@ def fibre_stress_around(link: Link, beam: Beam, position: float, fibre: float) -
             beam, beam.second_moment, squares[own.start - first : own.stop - first], slopes, position
         )
     around = np.arange(FIBRES) * (2.0 * math.pi / FIBRES)
-    outward = np.stack([np.cos(around), np.sin(around)], axis=1)
-    return np.asarray(pull_of(beam, len(link.elastic)) - beam.youngs_modulus * fibre * (outward @ bent))
+    outward = np.stack([matrices.cos(around), matrices.sin(around)], axis=1)
+    return np.asarray(pull_of(beam, len(link.elastic)) - beam.youngs_modulus * fibre * product(outward, bent))

@@ -2,7 +2,6 @@
 
 import csv
 import math
-import re
 from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
@@ -18,8 +17,6 @@ LARGEST = 10_000_000
 
 TURN = {"deg": 360.0, "rad": 2.0 * math.pi, "cycle": 1.0}
 """One cycle in the units that a column of angles may have."""
-
-_HEAD = re.compile(r"\s*(.*?)\s*\[(.*)\]\s*")
 
 
 def files_of(values: Mapping[str, Any]) -> list[str]:
@@ -52,10 +49,10 @@ def _is_file(kind: str, given: Any) -> bool:
 def _column(path: Path, wanted: Any) -> list[str]:
     try:
         rows = [row for row in csv.reader(contents(path, LARGEST).decode("utf-8-sig").splitlines()) if row]
-        heads = [_HEAD.fullmatch(head) for head in rows[0]] if rows else []
-        if not heads or not all(heads):
+        heads = [head.strip().partition("[") for head in rows[0]] if rows else []
+        if not heads or not all(rest.endswith("]") for _, _, rest in heads):
             raise ValueError("does not begin with names of columns and their units, as in: angle [deg],lift [mm]")
-        names, units = [head[1] for head in heads if head], [head[2].strip() for head in heads if head]
+        names, units = [name.strip() for name, _, _ in heads], [rest[:-1].strip() for _, _, rest in heads]
         numbers = [[float(cell) for cell in row] for row in rows[1:]]
         if not numbers or any(len(row) != len(names) for row in numbers):
             raise ValueError(f"has rows of other lengths than its {len(names)} columns, or none")

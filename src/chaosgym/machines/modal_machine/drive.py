@@ -9,20 +9,13 @@ from numpy.typing import ArrayLike
 
 from chaosgym.arrays import Array
 from chaosgym.errors import ParameterError
+from chaosgym.machines.loads import LARGEST, MOST_HARMONICS, Cycle
 from chaosgym.machines.modal_machine.structure import BASE, Structure
-from chaosgym.numbers import numbers, shown
+from chaosgym.numbers import numbers, whole
 
 KINDS = {"force": "N", "unbalance": "kg m", "displacement": "m", "acceleration": "m/s^2"}
 """What a drive prescribes, and its unit: a force; mass times eccentricity, whose force grows with the square of the
 harmonic's frequency; a motion of the base, with which the stops move."""
-
-MOST_HARMONICS = 64
-
-LEFT_OUT = 0.01
-"""Share of the largest harmonic that samples may differ from their harmonics unsaid."""
-
-LARGEST = 1e12
-"""Largest amplitude, in the kind's unit."""
 
 
 class Drive(NamedTuple):
@@ -46,26 +39,23 @@ class Drive(NamedTuple):
     @classmethod
     def sine(cls, kind: str, at: str, amplitude: float, harmonic: int = 1, angle: float = 0.0) -> "Drive":
         """Drive amplitude sin(harmonic w t + angle), the angle in rad."""
-        return cls(kind, at, ((harmonic, amplitude * math.sin(angle), amplitude * math.cos(angle)),))
+        return cls(kind, at, Cycle.sine(amplitude, harmonic, angle).harmonics)
 
     @classmethod
-    def sampled(cls, kind: str, at: str, values: ArrayLike, harmonics: int) -> "Drive":
-        """Drive of values at equal intervals over one cycle, the first at its beginning; its first harmonics.
+    def sampled(cls, kind: str, at: str, values: ArrayLike, harmonics: int | None = None) -> "Drive":
+        """Drive of values at equal intervals over one cycle, the first at its beginning; see ``Cycle.sampled``.
 
         Raises
         ------
         ParameterError
             If there are too few values for so many harmonics.
         """
-        cycle = numbers(f"samples of {kind}", values, -LARGEST, LARGEST, KINDS.get(kind, ""))
-        if not 1 <= harmonics <= MOST_HARMONICS:
-            raise ParameterError(f"harmonics = {shown(harmonics)} is out of range; allowed: 1 to {MOST_HARMONICS}")
-        if len(cycle) < 2 * harmonics + 1:
-            raise ParameterError(f"{harmonics} harmonics need {2 * harmonics + 1} samples of a cycle, not {cycle.size}")
-        parts = np.fft.rfft(cycle) / len(cycle)
-        rows = tuple((k, 2.0 * float(parts[k].real), -2.0 * float(parts[k].imag)) for k in range(1, harmonics + 1))
-        kept = np.fft.irfft(np.where(np.arange(len(parts)) <= harmonics, parts, 0.0) * len(cycle), len(cycle))
-        return cls(kind, at, rows, float(parts[0].real), float(np.max(np.abs(cycle - kept))))
+        return cls.over(kind, at, Cycle.sampled(f"samples of {kind}", values, harmonics, KINDS.get(kind, "")))
+
+    @classmethod
+    def over(cls, kind: str, at: str, cycle: Cycle) -> "Drive":
+        """Drive of values over a cycle."""
+        return cls(kind, at, cycle.harmonics, cycle.mean, cycle.left_out)
 
 
 def checked(drive: Drive) -> Drive:
@@ -82,8 +72,7 @@ def checked(drive: Drive) -> Drive:
         rule = f"'{BASE}'" if drive.at != BASE else f"a point other than '{BASE}'"
         raise ParameterError(f"{drive.kind} at {drive.at!r}: allowed: at {rule}")
     for order, *amplitudes in drive.harmonics:
-        if not 1 <= order <= MOST_HARMONICS:
-            raise ParameterError(f"harmonic = {shown(order)} is out of range; allowed: 1 to {MOST_HARMONICS}")
+        whole("harmonic", order, 1, MOST_HARMONICS)
         numbers(drive.kind, amplitudes, -LARGEST, LARGEST, KINDS[drive.kind])
     if drive.mean and drive.kind == "unbalance":
         raise ParameterError(f"the mean of {drive.kind} at {drive.at!r} is not 0; allowed: of all other kinds")
@@ -97,11 +86,8 @@ def drive_notes(drives: Iterable[Drive]) -> list[str]:
         size = max((math.hypot(*pair) for _, *pair in drive.harmonics), default=0.0)
         if drive.kind == "displacement" and abs(drive.mean) > 1e-9 * size:
             told.append(f"the base's mean displacement, {drive.mean:.4g} in SI, takes the stops along: it is left out")
-        if drive.left_out > LEFT_OUT * size:
-            told.append(
-                f"{len(drive.harmonics)} harmonics differ from the samples of the {drive.kind} at {drive.at!r} by up "
-                f"to {drive.left_out:.2g} in SI; harmonics = {MOST_HARMONICS} keeps the most"
-            )
+        missed = Cycle(drive.mean, drive.harmonics, drive.left_out).note(f"the {drive.kind} at {drive.at!r}")
+        told += [missed] if missed else []
     return told
 
 

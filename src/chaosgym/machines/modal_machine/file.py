@@ -8,28 +8,28 @@ from typing import Any
 import numpy as np
 
 from chaosgym.errors import ParameterError
+from chaosgym.machines.contact_law import LAW_KEYS, damping_for, hertzian, is_hertzian, with_power
 from chaosgym.machines.file_keys import needed
-from chaosgym.machines.linear_impact import damping_for
-from chaosgym.machines.machine import Machine, TaskDefaults
+from chaosgym.machines.friction_law import OF_FRICTION, with_friction
+from chaosgym.machines.loads import cycle_of
+from chaosgym.machines.machine import SPEED_IN_HZ, Machine, TaskDefaults
 from chaosgym.machines.modal_machine import cycle_file
 from chaosgym.machines.modal_machine.drive import KINDS, Drive
 from chaosgym.machines.modal_machine.file_structure import structure_of
-from chaosgym.machines.modal_machine.friction import OF_FRICTION, with_friction
 from chaosgym.machines.modal_machine.keys import KEYS
 from chaosgym.machines.modal_machine.machine import OF_JOINT, ModalMachine, aliases_of, clearance_option
 from chaosgym.machines.modal_machine.machine_class import Joint, machine_with_joints
+from chaosgym.machines.modal_machine.start import coordinate_units, start_of
 from chaosgym.machines.modal_machine.structure import BASE, Structure
 from chaosgym.machines.modal_machine.turning import turning_joints
-from chaosgym.machines.modal_machine.varying import Spring, VaryingMachine, checked_samples
+from chaosgym.machines.modal_machine.varying import HeldSpring, checked_samples
 from chaosgym.machines.parameters import described_as, parameter, parameters_of
-from chaosgym.machines.stated import class_with, range_of, state_of, tolerances_of
+from chaosgym.machines.stated import class_with, range_of, tolerances_of
+from chaosgym.numbers import number
 from chaosgym.units import TURNING
 
 SAMPLED = ("drive", "joint", "spring")
 """Tables that take samples of a cycle."""
-
-MOST_SAMPLED = 16
-"""Harmonics of a sampled cycle by default, at most."""
 
 
 def tables_of(values: Mapping[str, Any], folder: Path) -> dict[str, Any]:
@@ -44,10 +44,16 @@ def tables_of(values: Mapping[str, Any], folder: Path) -> dict[str, Any]:
     sampled: dict[str, list[Any]] = {name: _rows(values.get(name, []), name, folder) for name in SAMPLED}
     for name in KEYS.required:
         if name not in values:
-            raise ParameterError(f"[[{name}]] is missing" if name == "drive" else f"[{name}] is missing")
+            raise ParameterError(f"[{name}] is missing")
+    if not {"drive", "load"} & set(values) and "initial_state" not in values["operation"]:
+        raise ParameterError("[[drive]] is missing; allowed without one: a [[load]], or operation.initial_state")
+    loads = values.get("load", [])
     for path in KEYS.tables:
         outer, _, inner = path.rpartition(".")
         if outer == "joint":
+            continue
+        if path == "load":
+            data[path] = [KEYS.checked(path, row) for row in (loads if isinstance(loads, list) else [loads])]
             continue
         if path in SAMPLED:
             data[path] = (
@@ -58,6 +64,7 @@ def tables_of(values: Mapping[str, Any], folder: Path) -> dict[str, Any]:
         data[path] = KEYS.checked(path, given)
     for joint, moves in zip(data["joint"], turning_joints({**values, **sampled}), strict=True):
         joint["turns"] = moves
+    data["coordinates"] = coordinate_units(values["structure"])
     return data
 
 
@@ -72,7 +79,7 @@ def _joints(rows: list[Any]) -> list[dict[str, Any]]:
         raise ParameterError("[[joint]] is missing")
     found = []
     for row in rows:
-        values = KEYS.checked("joint", row)
+        values = KEYS.checked("joint", with_power("joint", row) if isinstance(row, dict) else row)
         if "stiffness" in values:
             varies = checked_samples("joint.stiffness", values["stiffness"], -math.inf)
             values["stiffness"] = float(np.mean(varies))
@@ -103,11 +110,17 @@ def built(path: str, digest: str, data: Mapping[str, Any], folder: Path) -> type
     named = zip(("speed", "clearance"), ends, strict=True)
     usual = {name: range_of(ModalMachine, f"operation.{name}_range", name, given) for name, given in named}
     definition = parameter(digest, choices=(digest,), provenance="stated", source=path)
-    drives, title = tuple(_drive(row) for row in data["drive"]), data[""].get("title", path)
+    drives = (*(_drive(row) for row in data["drive"]), *(_load(row) for row in data["load"]))
+    title, springs = data[""].get("title", path), tuple(_spring(row) for row in data["spring"])
+    steady = [spring for spring in springs if len(spring.values) == 1]
+    if steady:
+        structure = structure.with_springs((spring.at, spring.values[0], spring.damping) for spring in steady)
+    springs = tuple(spring for spring in springs if len(spring.values) > 1)
     types: dict[str, Any] = {"name": path, "__doc__": title}
     made: Any
-    if len(data["joint"]) > 1 or "tangent" in data["joint"][0]:
-        _refuse_varying(data)
+    first = data["joint"][0]
+    plain = not springs and {"friction", "tangent", "slides", "samples"}.isdisjoint(first) and not is_hertzian(first)
+    if len(data["joint"]) > 1 or not plain:
         about = {"provenance": "stated", "source": path}
         watched = {"monitored": operation["monitored"]} if "monitored" in operation else {}
         joints = _several_joints(data["joint"], structure)
@@ -120,32 +133,21 @@ def built(path: str, digest: str, data: Mapping[str, Any], folder: Path) -> type
             usual_ranges=usual,
             namespace=types,
             definition=definition,
+            springs=springs,
             speed=speed,
             **watched,
         )
     else:
-        springs = tuple(_spring(row) for row in data["spring"])
         if "monitored" in operation:
             raise ParameterError("operation.monitored needs several [[joint]]; allowed with one: leave it out")
-        made = _with_one_joint(structure, data["joint"][0], drives, springs, speed, usual, types, definition, path)
+        made = _with_one_joint(structure, first, drives, speed, usual, types, definition, path)
     made.tolerances = tolerances_of(data["tolerances"], made())
-    made.stated_state = state_of(operation, made())
+    if "initial_state" in operation:
+        start = start_of(operation["initial_state"], data["coordinates"], structure)
+        made.stated_state = made().from_state(start).initial_state
     made.task_defaults = TaskDefaults(task={**made.task_defaults.task, **data["job"]})
     kind: type[Machine] = made
     return kind
-
-
-def _refuse_varying(data: Mapping[str, Any]) -> None:
-    """Refuse what goes neither with several joints nor with friction that sticks."""
-    beside = "several [[joint]]" if len(data["joint"]) > 1 else "joint.tangent"
-    for row in data["joint"]:
-        if "slides" in row:
-            allowed = "tangent, with sliding_speed" if len(data["joint"]) > 1 else "one of them"
-            raise ParameterError(f"joint.slides does not go with {beside}; allowed: {allowed}")
-        if "samples" in row:
-            raise ParameterError(f"joint.stiffness over the cycle does not go with {beside}; allowed: one number")
-    if data["spring"]:
-        raise ParameterError(f"[[spring]] does not go with {beside}; allowed: with one [joint] without tangent")
 
 
 def _aliases_of_one(name: str) -> dict[str, str]:
@@ -154,16 +156,36 @@ def _aliases_of_one(name: str) -> dict[str, str]:
     return {known: f"{name}_{what}" for what, same in plain.items() for known in (same, f"joint.{what}")}
 
 
-def _spring(row: Mapping[str, Any]) -> Spring:
-    at, values = needed("spring", row, "at", "stiffness")
-    return Spring(at, tuple(checked_samples("spring.stiffness", values, 0.0).tolist()))
+def _spring(row: Mapping[str, Any]) -> HeldSpring:
+    (at,) = needed("spring", row, "at")
+    if "stiffness" not in row and "damping" not in row:
+        raise ParameterError("[spring] lacks stiffness; allowed without one: damping")
+    values = checked_samples("spring.stiffness", row.get("stiffness", 0.0), 0.0)
+    return HeldSpring(at, tuple(values.tolist()), row.get("damping", 0.0))
+
+
+def _load(row: Mapping[str, Any]) -> Drive:
+    kinds = [kind for kind in ("force", "acceleration") if kind in row]
+    if len(kinds) != 1:
+        raise ParameterError(
+            f"a [[load]] has {' and '.join(kinds) or 'no strength'}; allowed: a force or an acceleration"
+        )
+    at = row.get("at") or (BASE if kinds == ["acceleration"] else "")
+    if not at:
+        raise ParameterError("a [[load]] of a force lacks at, the point where it acts")
+    return Drive(kinds[0], at, (), float(row[kinds[0]]))
 
 
 def _stated_of(joint: Mapping[str, Any], name: str, structure: Structure) -> dict[str, Any]:
     """What a file states of a joint, with factors of the lower stop, and the damper that a restitution stands for."""
     joint = with_friction(joint, name)
-    if "restitution" in joint:
-        joint = _with_damper(joint, name, structure)
+    if is_hertzian(joint):
+        joint = _with_law(joint, name)
+    else:
+        for key in ("impact_speed", "law"):
+            if key in joint:
+                raise ParameterError(f"{name}.{key} has no meaning without {name}.hertz_stiffness; leave it out")
+        joint = _with_damper(joint, name, structure) if "restitution" in joint else joint
     _, clearance, *upper = needed(name, joint, "at", "clearance", "stiffness", "damping")
     stated = {key: value for key, value in joint.items() if key not in ("lower", "name")}
     for key, above in zip(("stiffness", "damping"), upper, strict=True):
@@ -177,19 +199,31 @@ def _stated_of(joint: Mapping[str, Any], name: str, structure: Structure) -> dic
     return stated
 
 
+def _with_law(joint: Mapping[str, Any], name: str) -> dict[str, Any]:
+    """A joint of a Hertzian surface: its K, chi and n in place of what states them."""
+    stiffness, damping, exponent = hertzian(name, joint)
+    for key in ("stiffness", "damping"):
+        if key in joint["lower"]:
+            raise ParameterError(
+                f"{name}.lower.{key} does not go with a Hertzian joint; allowed: two joints, of one stop"
+            )
+    rest = {key: value for key, value in joint.items() if key not in LAW_KEYS}
+    return {**rest, "stiffness": stiffness, "damping": damping, "exponent": exponent}
+
+
 def _with_damper(joint: Mapping[str, Any], name: str, structure: Structure) -> dict[str, Any]:
     """A joint with the damper that restores the stated share of the speed of the mass that strikes.
 
     That mass is what resists a short push at the joint, 1 / |phi|^2 of all kept modes (Schwager and Poeschel 2007, see
-    ``linear_impact``).
+    ``restitution_of``).
     """
     at, stiffness, restored = needed(name, joint, "at", "stiffness", "restitution")
     if "samples" in joint:
         raise ParameterError(f"{name}.restitution needs one stiffness; allowed with samples of a cycle: damping")
     if "damping" in joint or "damping" in joint["lower"]:
         raise ParameterError(f"{name} has restitution and damping; allowed: one of them")
-    if not 1e-3 <= restored <= 1.0 or not stiffness > 0.0:
-        raise ParameterError(f"{name}.restitution = {restored:g} is out of range; allowed: 0.001 to 1")
+    number(f"{name}.restitution", restored, 1e-3, 1.0)
+    number(f"{name}.stiffness", stiffness, 0.0, inside=True)
     mobility = float(np.sum(structure.shape(at) ** 2))
     if mobility == 0.0:
         raise ParameterError(f"{name}.at = {at!r} never moves: every shape is 0 there")
@@ -202,8 +236,8 @@ def _with_damper(joint: Mapping[str, Any], name: str, structure: Structure) -> d
 def _several_joints(tables: list[dict[str, Any]], structure: Structure) -> dict[str, Joint]:
     """Joints by their names: the stated ones, or joint_1, joint_2 ..."""
     joints: dict[str, Joint] = {}
-    for number, table in enumerate(tables, 1):
-        name = table.get("name", f"joint_{number}" if len(tables) > 1 else "joint")
+    for place, table in enumerate(tables, 1):
+        name = table.get("name", f"joint_{place}" if len(tables) > 1 else "joint")
         if name in joints:
             raise ParameterError(f"two [[joint]] have the name {name!r}; allowed: a name of its own for each")
         joints[name] = Joint(**_stated_of(table, name if "name" in table else "joint", structure))
@@ -214,7 +248,6 @@ def _with_one_joint(
     structure: Structure,
     joint: Mapping[str, Any],
     drives: tuple[Drive, ...],
-    springs: tuple[Spring, ...],
     speed: float,
     usual: Mapping[str, Any],
     types: Mapping[str, Any],
@@ -222,27 +255,24 @@ def _with_one_joint(
     path: str,
 ) -> Any:
     stated = _stated_of(joint, "joint", structure)
-    turning, samples, slides = stated.pop("turns"), stated.pop("samples", ()), stated.pop("slides", "")
-    base: Any = VaryingMachine if samples or springs or "friction" in stated else ModalMachine
+    turning = stated.pop("turns")
     fields: dict[str, Any] = {
         "modes": structure,
         "joint": stated.pop("at"),
         "drives": drives,
         "definition": definition,
     }
-    if base is VaryingMachine:
-        fields |= {"samples": samples, "springs": springs, "slides": slides}
-    known = parameters_of(base)
+    known = parameters_of(ModalMachine)
     values = {"speed": speed, **{OF_JOINT.get(name, name): value for name, value in stated.items()}}
     for field in known:
         unit = known[field].unit
         about = {"provenance": "stated", "source": path} if field in values else {}
         about["unit"] = TURNING.get(unit, unit) if turning else unit
-        fields[field] = described_as(known[field], values.get(field, getattr(base, field)), **about)
-    options = {"--speed-hz": ModalMachine.options["--speed-hz"], **clearance_option("clearance", turning)}
+        fields[field] = described_as(known[field], values.get(field, getattr(ModalMachine, field)), **about)
+    options = {**SPEED_IN_HZ, **clearance_option("clearance", turning)}
     types = {**types, "usual_ranges": usual, "turning": ("joint",) if turning else (), "options": options}
     types["aliases"] = aliases_of("joint") | aliases_of(joint.get("name", "joint"))
-    return class_with(base, fields, types)
+    return class_with(ModalMachine, fields, types)
 
 
 def _drive(row: Mapping[str, Any]) -> Drive:
@@ -255,11 +285,4 @@ def _drive(row: Mapping[str, Any]) -> Drive:
     at = row.get("at") or (BASE if kind in ("displacement", "acceleration") else "")
     if not at:
         raise ParameterError(f"a [[drive]] of a {kind} lacks at, the point where it acts")
-    values = row[kind]
-    for name in ("harmonics",) if len(values) == 1 else ("harmonic", "angle"):
-        if name in row:
-            what = "one amplitude" if len(values) == 1 else "samples of a cycle"
-            raise ParameterError(f"drive.{name} has no meaning beside {what}; leave it out")
-    if len(values) == 1:
-        return Drive.sine(kind, at, float(values[0]), row.get("harmonic", 1), math.radians(row.get("angle", 0.0)))
-    return Drive.sampled(kind, at, values, row.get("harmonics", min(MOST_SAMPLED, (len(values) - 1) // 2)))
+    return Drive.over(kind, at, cycle_of("drive", row, kind, KINDS[kind]))

@@ -2,7 +2,7 @@
 
 import math
 from collections.abc import Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from functools import lru_cache
 from typing import TYPE_CHECKING, Any, ClassVar
 
@@ -10,22 +10,22 @@ import numpy as np
 
 from chaosgym.arrays import Array
 from chaosgym.core.cycle import CycleArrays, cycle_arrays
+from chaosgym.core.matrices import product
 from chaosgym.core.tangent import Tangents, no_tangents
 from chaosgym.errors import ParameterError
-from chaosgym.machines.abilities import Flexible
+from chaosgym.machines.abilities import Flexible, FreeBodies, Propagation
 from chaosgym.machines.flexible_model import Modes, with_rigid_bodies
+from chaosgym.machines.friction_law import OF_FRICTION
 from chaosgym.machines.integrators import ExactEvents, Integrator
 from chaosgym.machines.joint_sets import PressedSets, Sliders
 from chaosgym.machines.joint_tables import JointTables
-from chaosgym.machines.machine import Machine, Number, Option
-from chaosgym.machines.modal_machine.drive import Drive, checked, drive_notes, modal_drive
-from chaosgym.machines.modal_machine.friction import OF_FRICTION
-from chaosgym.machines.modal_machine.machine import as_there, rigid_note, turning_note
-from chaosgym.machines.modal_machine.structure import Structure
+from chaosgym.machines.machine import Machine
+from chaosgym.machines.modal_machine.drive import checked, modal_drive
+from chaosgym.machines.modal_machine.driven_structure import DrivenStructure
 from chaosgym.machines.parameters import parameter
 
 if TYPE_CHECKING:
-    from chaosgym.machines.joint_batch import JointBatch
+    from chaosgym.machines.joint_tables import JointBatch
 
 
 LARGEST = "largest"
@@ -33,17 +33,8 @@ LARGEST = "largest"
 
 
 @dataclass(frozen=True, kw_only=True)
-class JointedMachine(Machine):
+class JointedMachine(DrivenStructure, Machine):
     """A structure of a few modes with several joints and a periodic drive; made by ``machine_with_joints``.
-
-    What is known of a joint is a field each: ``left_clearance`` of the joint "left", and so on.
-
-    Attributes
-    ----------
-    modes
-        Of the structure between the stops.
-    drives
-        What drives it, by harmonics of the speed.
 
     Raises
     ------
@@ -52,27 +43,9 @@ class JointedMachine(Machine):
     """
 
     name: ClassVar[str] = "jointed-machine"
-    speed_field: ClassVar[str] = "speed"
-    options: ClassVar[Mapping[str, Option]] = {"--speed-hz": Number("speed", "Hz")}
-    places: ClassVar[Mapping[str, str]] = {}
-    """Point that moves in the gap of each joint, by the joint's name."""
-
     tangents: ClassVar[Mapping[str, str]] = {}
     """Point whose motion is along the surfaces, by the name of each joint that may have friction."""
 
-    turning: ClassVar[tuple[str, ...]] = ()
-    """Names of joints that turn, as of ``ModalMachine``."""
-
-    modes: Structure
-    drives: tuple[Drive, ...] = field(default=())
-    speed: float = as_there("speed")
-    """Operating cycles a second [Hz]."""
-    drive_level: float = as_there("drive_level")
-    """Factor of all harmonics of the drive."""
-    damping_factor: float = as_there("damping_factor")
-    """Factor of the structure's damping."""
-    frequency_factor: float = as_there("frequency_factor")
-    """Factor of all natural frequencies."""
     monitored: str = parameter(LARGEST, choices=(LARGEST,), provenance="assumed", source="default")
     """Joint whose motion is shown and whose force is judged; "largest": the one with the largest force of a run."""
 
@@ -82,7 +55,6 @@ class JointedMachine(Machine):
         for name, row in zip(self.joints, self.joint_shapes, strict=True):
             if not row.any():
                 raise ParameterError(f"{name}.at = {self.places[name]!r} never moves: every shape is 0 there")
-        _refuse_same_place(self.joints, self.places, self.joint_shapes)
         for name, point in self.tangents.items():
             if not self.modes.shape(point).any():
                 raise ParameterError(f"{name}.tangent = {point!r} never moves: every shape is 0 there")
@@ -129,27 +101,17 @@ class JointedMachine(Machine):
         lower = np.where(self.of_joints("stops") == "two", middle - gap, -math.inf)
         return np.stack([middle + gap, lower], axis=1)
 
-    def room_of(self, joint: int) -> tuple[float, float]:
-        """Displacement [m] of a joint at its lower and its upper stop, infinite where there is none."""
-        upper, lower = self.stops[joint].tolist()
+    def room_of(self, joint: int | None = None) -> tuple[float, float]:
+        """Displacement [m] of a joint, or of that behind ``clearance_field``, at its stops; see ``Machine.room_of``."""
+        watched = self.joints.index(self.clearance_field.removesuffix("_clearance"))
+        upper, lower = self.stops[watched if joint is None else joint].tolist()
         return lower, upper
-
-    @property
-    def room(self) -> tuple[float, float]:
-        """That of the joint behind ``clearance_field``."""
-        return self.room_of(self.joints.index(self.clearance_field.removesuffix("_clearance")))
 
     @property
     def sets(self) -> PressedSets:
         """The structure with each set of pressed surfaces; machines that differ in what drives them share them."""
-        springs, dampers = self.of_joints("stiffness"), self.of_joints("damping")
-        lower = self.of_joints("lower_stiffness_factor"), self.of_joints("lower_damping_factor")
-        key = (self.frequency_factor, self.damping_factor, tuple(springs), tuple(dampers), *map(tuple, lower))
-        rubs = tuple(
-            (self.joints.index(name), self.tangents[name], *(getattr(self, f"{name}_{what}") for what in OF_FRICTION))
-            for name in self.rubbing
-        )
-        return _sets(self.modes, tuple(self.places.values()), tuple(self.of_joints("stops") == "two"), *key, rubs)
+        beside = {f"{name}_{what}": 0.0 for name in self.joints for what in ("clearance", "offset", "preload")}
+        return _sets(self._with_unchecked(speed=1.0, drive_level=1.0, drives=(), monitored=LARGEST, **beside))
 
     def reduce(self) -> PressedSets:
         """Return what the kernels integrate between contact events."""
@@ -165,8 +127,7 @@ class JointedMachine(Machine):
         """What turns or rubs, modes that count as rigid, and what sampled drives leave out."""
         along = ", ".join(f"{self.tangents[name]!r} ({name})" for name in self.rubbing)
         rubs = along and f"friction sticks and slides along {along}"
-        notes = turning_note(self.turning), rigid_note(self.natural_frequencies), rubs, *drive_notes(self.drives)
-        return tuple(filter(None, notes))
+        return self._notes(rubs)
 
     @property
     def flexible(self) -> Flexible | None:
@@ -176,11 +137,14 @@ class JointedMachine(Machine):
     @property
     def without_friction(self) -> Flexible:
         """The structure's equations between contacts, without friction."""
-        return Flexible(self.sets.stiffness, self.sets.damping, self.sets.shape, *self._drive())
+        points = self.modes.points_beside(self.places.values())
+        return Flexible(self.sets.stiffness, self.sets.damping, self.sets.shape, *self._drive(), points)
 
-    def shape_of(self, place: str) -> Array:
-        """Mode shapes (n,) at a point of the structure; see ``Machine.shape_of``."""
-        return self.modes.shape(place)
+    @property
+    def free_bodies(self) -> FreeBodies:
+        """What holds its free bodies: joints, and friction along them."""
+        rows = [*self.sets.shape, *(self.modes.shape(self.tangents[name]) for name in self.rubbing)]
+        return FreeBodies(self.sets.stiffness == 0.0, self.sets.damping, np.array(rows))
 
     @property
     def n_states(self) -> int:
@@ -198,14 +162,9 @@ class JointedMachine(Machine):
         return self.sets.fastest
 
     @property
-    def carries_deviations(self) -> bool:
-        """Always: deviations cross every contact exactly."""
-        return True
-
-    @property
-    def runs_fixed_steps(self) -> bool:
-        """Never: a machine with several joints is run exactly."""
-        return False
+    def moving(self) -> Propagation:
+        """Exactly only, and deviations cross every contact exactly."""
+        return Propagation(fixed_steps=False)
 
     def state_weights(self, state: Array) -> Array:
         """Weights (n_states,) by which the squared norm of a deviation is its energy."""
@@ -222,7 +181,7 @@ class JointedMachine(Machine):
             return -math.inf
         sets = self.sets
         structure = -float(np.trace(sets.damping)) * self.cycle_period
-        return structure - float((sets.dampers * np.sum(sets.shape**2, axis=1)[:, None]).ravel() @ contact_time)
+        return structure - float(product((sets.dampers * np.sum(sets.shape**2, axis=1)[:, None]).ravel(), contact_time))
 
     def _drive(self) -> tuple[Array, Array]:
         """Modal forces of cosine and sine of each harmonic, (H, 2, n), and constant ones, (n,)."""
@@ -233,7 +192,7 @@ class JointedMachine(Machine):
     def _load(self) -> tuple[Array, Array]:
         """The drive at level 1, (2, H, 2, n) as of ``put_sets``, and constant modal forces, (n,)."""
         harmonics, static = modal_drive(self.modes, self.drives)
-        return harmonics, static + self.of_joints("preload") @ self.joint_shapes
+        return harmonics, static + product(self.of_joints("preload"), self.joint_shapes)
 
     def tables(self, step_phase: float = ExactEvents.step_phase) -> JointTables:
         """Return tables of its own at its speed and drive, none made yet."""
@@ -241,7 +200,7 @@ class JointedMachine(Machine):
 
     def batch(self, count: int) -> "JointBatch":
         """Return ``count`` variants that move in one compiled call."""
-        from chaosgym.machines.joint_batch import JointBatch
+        from chaosgym.machines.joint_tables import JointBatch
 
         return JointBatch(self, count)
 
@@ -254,7 +213,7 @@ class JointedMachine(Machine):
         tangents: Tangents | None = None,
     ) -> tuple[int, int]:
         """Run as many cycles as ``arrays`` has rows; see ``Machine.run``."""
-        assert isinstance(integrator, ExactEvents), "runs_fixed_steps is False"
+        assert isinstance(integrator, ExactEvents), "no fixed steps"
         # gaps are no part of the tables
         gaps = {f"{name}_{what}": 0.0 for name in self.joints for what in ("clearance", "offset")}
         tables = _tables(self._with_unchecked(**gaps, monitored=LARGEST), integrator.step_phase)
@@ -278,50 +237,25 @@ class JointedMachine(Machine):
 
 
 @lru_cache(maxsize=64)
-def _sets(
-    modes: Structure,
-    places: tuple[str, ...],
-    two_sided: tuple[bool, ...],
-    frequency_factor: float,
-    damping_factor: float,
-    springs: tuple[float, ...],
-    dampers: tuple[float, ...],
-    spring_factors: tuple[float, ...],
-    damper_factors: tuple[float, ...],
-    rubs: tuple[tuple[int, str, float, float, float], ...],
-) -> PressedSets:
-    shape = np.array([modes.shape(place) for place in places])
-    upper, damper = np.array(springs), np.array(dampers)
-    rates, damping = frequency_factor * modes.angular_frequency, damping_factor * modes.damping
+def _sets(machine: JointedMachine) -> PressedSets:
+    shape, of = machine.joint_shapes, machine.of_joints
+    rates = machine.frequency_factor * machine.modes.angular_frequency
+    damping = machine.damping_factor * machine.modes.damping
     free = with_rigid_bodies(Modes(rates, damping, shape[0], np.zeros_like(shape[0])))
-    both = np.stack([upper, upper * spring_factors], axis=1)
-    dampers_of = np.stack([damper, damper * damper_factors], axis=1)
+    springs = of("stiffness")[:, None] * np.stack([np.ones(len(shape)), of("lower_stiffness_factor")], axis=1)
+    dampers = of("damping")[:, None] * np.stack([np.ones(len(shape)), of("lower_damping_factor")], axis=1)
     sliders = None
-    if rubs:
-        joints, points, friction, factors, speeds = zip(*rubs, strict=True)
-        sliders = Sliders(
-            np.array(joints, np.int64),
-            np.array([modes.shape(point) for point in points]),
-            np.array(friction),
-            np.array(speeds),
-            both[list(joints)] * np.array(factors)[:, None],
+    if machine.rubbing:
+        joints = np.array([machine.joints.index(name) for name in machine.rubbing], np.int64)
+        along = np.array([machine.modes.shape(machine.tangents[name]) for name in machine.rubbing])
+        friction, factors, speeds = (
+            np.array([getattr(machine, f"{name}_{what}") for name in machine.rubbing]) for what in OF_FRICTION
         )
-    return PressedSets(free.angular_frequency**2, free.damping, shape, both, dampers_of, np.array(two_sided), sliders)
+        sliders = Sliders(joints, along, friction, speeds, springs[joints] * factors[:, None])
+    return PressedSets(free.angular_frequency**2, free.damping, shape, springs, dampers, of("stops") == "two", sliders)
 
 
 @lru_cache(maxsize=8)
 def _tables(machine: JointedMachine, step_phase: float) -> JointTables:
     """Tables of a machine at its speed and drive; few are kept, since they are large."""
     return machine.tables(step_phase)
-
-
-def _refuse_same_place(names: tuple[str, ...], places: Mapping[str, str], shapes: Array) -> None:
-    """Refuse joints that move alike: two stops at one place are one joint."""
-    lengths = np.linalg.norm(shapes, axis=1)
-    for j, name in enumerate(names):
-        for i in range(j):
-            if abs(float(shapes[i] @ shapes[j])) > (1.0 - 1e-9) * lengths[i] * lengths[j]:
-                raise ParameterError(
-                    f"{name}.at = {places[name]!r} moves as {names[i]}.at = {places[names[i]]!r} does; allowed: one "
-                    "joint at each place (its two stops may differ: [joint.lower])"
-                )

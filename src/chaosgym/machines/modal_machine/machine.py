@@ -6,7 +6,7 @@ machine = ModalMachine(modes=structure, joint="tip", drives=(Drive.sine("force",
 
 import math
 from collections.abc import Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from functools import lru_cache
 from typing import Any, ClassVar
 
@@ -16,13 +16,13 @@ from chaosgym.arrays import Array
 from chaosgym.core.joints.tables import SLOW
 from chaosgym.core.modal_model import ModalImpactModel
 from chaosgym.errors import ParameterError
+from chaosgym.machines.abilities import Flexible
 from chaosgym.machines.flexible_model import Modes, Stop, flexible_model
-from chaosgym.machines.machine import Number, Option
-from chaosgym.machines.modal_blocks import RIGID_SHARE, nearly_rigid
+from chaosgym.machines.machine import SPEED_IN_HZ, Number, Option
 from chaosgym.machines.modal_impact import ModalImpactMachine
-from chaosgym.machines.modal_machine.drive import Drive, checked, drive_notes, modal_drive
-from chaosgym.machines.modal_machine.structure import Structure
-from chaosgym.machines.parameters import assumed, described_as, parameter, parameters_of
+from chaosgym.machines.modal_machine.drive import checked, modal_drive
+from chaosgym.machines.modal_machine.driven_structure import DrivenStructure
+from chaosgym.machines.parameters import assumed, parameter
 
 ROUNDING = 2.0**-52
 """Relative distance of neighbouring numbers."""
@@ -49,17 +49,15 @@ def aliases_of(joint: str) -> dict[str, str]:
 
 
 @dataclass(frozen=True, kw_only=True)
-class ModalMachine(ModalImpactMachine):
+class ModalMachine(DrivenStructure, ModalImpactMachine):
     """A structure of a few modes with one joint that has a gap, and a periodic drive.
+
+    Fields that are not listed are those of ``DrivenStructure``.
 
     Attributes
     ----------
-    modes
-        Of the structure between the stops.
     joint
         Point that moves in the gap, such as "tip", "-tip" or "pinion - wheel"; the upper stop lies where it grows.
-    drives
-        What drives it, by harmonics of the speed.
 
     Raises
     ------
@@ -76,23 +74,15 @@ class ModalMachine(ModalImpactMachine):
     """
 
     name: ClassVar[str] = "modal-machine"
-    speed_field: ClassVar[str] = "speed"
     clearance_field: ClassVar[str] = "clearance"
     aliases: ClassVar[Mapping[str, str]] = aliases_of("joint")
     usual_ranges: ClassVar[Mapping[str, tuple[float, float]]] = {"speed": (4.0, 30.0), "clearance": (2e-5, 2e-4)}
     options: ClassVar[Mapping[str, Option]] = {
-        "--speed-hz": Number("speed", "Hz"),
+        **SPEED_IN_HZ,
         "--clearance-mm": Number("clearance", "mm", 1e-3),
     }
 
-    turning: ClassVar[tuple[str, ...]] = ()
-    """Names of joints that turn: their fields are in rad and N m, and "N" and "m" of a result mean these."""
-
-    modes: Structure
     joint: str
-    drives: tuple[Drive, ...] = field(default=())
-    speed: float = assumed(30.0, "Hz", 1e-3, 1e5)
-    """Operating cycles a second [Hz]."""
     clearance: float = assumed(0.1e-3, "m", 0.0, 10.0)
     """Half the gap; with one stop its distance from the middle [m]."""
     offset: float = assumed(0.0, "m", -10.0, 10.0)
@@ -109,12 +99,6 @@ class ModalMachine(ModalImpactMachine):
     """Damper of the lower stop over that of the upper one."""
     preload: float = assumed(0.0, "N", -1e9, 1e9)
     """Constant force on the joint, towards the upper stop [N]."""
-    drive_level: float = assumed(1.0, "-", 0.0, 1e6)
-    """Factor of all harmonics of the drive."""
-    damping_factor: float = assumed(1.0, "-", 0.0, 1e6)
-    """Factor of the structure's damping."""
-    frequency_factor: float = assumed(1.0, "-", 1e-3, 1e3)
-    """Factor of all natural frequencies."""
 
     def __post_init__(self, fidelity: str | None) -> None:
         super().__post_init__(fidelity)
@@ -127,9 +111,10 @@ class ModalMachine(ModalImpactMachine):
         """Displacement and velocity of every mode."""
         return 2 * len(self.modes.angular_frequency)
 
-    def shape_of(self, place: str) -> Array:
-        """Mode shapes (n,) at a point of the structure; see ``Machine.shape_of``."""
-        return self.modes.shape(place)
+    @property
+    def flexible(self) -> Flexible:
+        """Its equations between contacts, with the shapes of the points that are not the joint."""
+        return super().flexible._replace(points=self.modes.points_beside([self.joint]))
 
     @property
     def operating_fields(self) -> tuple[str, ...]:
@@ -143,8 +128,7 @@ class ModalMachine(ModalImpactMachine):
             self._with_unchecked(speed=1.0, clearance=0.0, offset=0.0, drive_level=1.0)
         )
 
-    @property
-    def room(self) -> tuple[float, float]:
+    def room_of(self, joint: int | None = None) -> tuple[float, float]:
         """Displacement [m] of the joint at its lower and its upper stop; with one stop there is no lower one."""
         upper, lower = self.stops_at(self.clearance).tolist()
         return lower, upper
@@ -177,19 +161,7 @@ class ModalMachine(ModalImpactMachine):
                 f"the static force would push a mode of {hertz[held][np.argmax(away)]:.3g} Hz {farthest:.2g} m away: "
                 f"positions are good to {ROUNDING * farthest:.1g} m only; write 0 Hz if the body is free"
             )
-        of_drives = drive_notes(self.drives)
-        return tuple(note for note in (turning_note(self.turning), rigid_note(hertz), far, *of_drives) if note)
-
-
-def as_there(name: str) -> Any:
-    """Field of the same name and default as that of ``ModalMachine``."""
-    return described_as(parameters_of(ModalMachine)[name], getattr(ModalMachine, name))
-
-
-def turning_note(joints: tuple[str, ...]) -> str:
-    """What is to be said of joints that turn; empty if none does."""
-    who = "the joint turns" if joints == ("joint",) else f"joints that turn: {', '.join(joints)}"
-    return f"{who}; results write N for its N m and m for its rad (mm for mrad)" if joints else ""
+        return self._notes(far)
 
 
 def clearance_option(field: str, turning: bool) -> dict[str, Option]:
@@ -197,13 +169,6 @@ def clearance_option(field: str, turning: bool) -> dict[str, Option]:
     if turning:
         return {"--clearance-arcmin": Number(field, "arcmin", math.pi / 10_800.0)}
     return {"--clearance-mm": Number(field, "mm", 1e-3)}
-
-
-def rigid_note(hertz: Array) -> str:
-    """What is to be said of natural frequencies (n,) [Hz] that count as motions of a rigid body; empty if none does."""
-    slow = ", ".join(f"{rate:.3g}" for rate in hertz[nearly_rigid(hertz)])
-    told = f"modes of {slow} Hz count as motions of a rigid body: below {RIGID_SHARE:g} of the fastest mode"
-    return told if slow else ""
 
 
 @lru_cache(maxsize=256)

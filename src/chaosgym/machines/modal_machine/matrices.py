@@ -7,6 +7,7 @@ from typing import Any
 import numpy as np
 
 from chaosgym.arrays import Array
+from chaosgym.core.matrices import eigh, product
 from chaosgym.errors import ParameterError
 from chaosgym.files import first_line
 from chaosgym.numbers import numbers
@@ -22,6 +23,9 @@ SYMMETRIC = 1e-9
 
 LARGEST_ENTRY = 1e20
 """Largest entry of a matrix: of a stiffness far beyond any structure's, of which products stay finite."""
+
+SMALL = 200
+"""Degrees of freedom up to which modes have equal bits on every processor: beyond, a library is many times as fast."""
 
 DENSE, MOST_DENSE = 600, 6000
 """Degrees of freedom up to which all modes are computed at once: always, and where a third of them is kept."""
@@ -80,8 +84,8 @@ def slowest_modes(mass: Any, stiffness: Any, count: int) -> tuple[Array, Array]:
             squares, vectors = found[0][order], found[1][:, order]
     except (np.linalg.LinAlgError, RuntimeError, MemoryError, TypeError) as error:
         raise ParameterError(f"the modes of mass and stiffness can't be computed: {first_line(error)}") from None
-    energy = np.einsum("ij,ij->j", vectors, stiffness @ vectors)
-    cancelled = np.einsum("ij,ij->j", np.abs(vectors), abs(stiffness) @ np.abs(vectors))
+    energy = np.einsum("ij,ij->j", vectors, times(stiffness, vectors))
+    cancelled = np.einsum("ij,ij->j", np.abs(vectors), times(abs(stiffness), np.abs(vectors)))
     if np.any(energy < -1e-9 * cancelled):
         raise ParameterError(f"stiffness is not positive semidefinite: w^2 = {energy.min():.3g} 1/s^2 of a mode")
     squares = np.where(energy <= RIGID * cancelled, 0.0, np.maximum(squares, 0.0))
@@ -92,22 +96,36 @@ def slowest_modes(mass: Any, stiffness: Any, count: int) -> tuple[Array, Array]:
 def _slowest_dense(mass: Array, stiffness: Array, count: int) -> tuple[Array, Array]:
     """Squares (count,) and shapes, by the inverse problem M s = K s / w^2 where nothing moves freely: it keeps slow
     modes exact on fine meshes."""
-    from scipy.linalg import eigh
-
     size = len(mass)
     if np.all(np.diag(stiffness) > 0.0):
         scale = 1.0 / np.sqrt(np.diag(stiffness))
         both = np.outer(scale, scale)
         try:
-            inverse, shapes = eigh(mass * both, stiffness * both, subset_by_index=[size - count, size - 1])
+            inverse, shapes = _eigenpairs(mass * both, stiffness * both, size - count, size)
         except np.linalg.LinAlgError:
             pass
         else:
             inverse, shapes = inverse[::-1], shapes[:, ::-1]
             if inverse[-1] > 1e-12 * inverse[0]:
                 return 1.0 / inverse, scale[:, None] * shapes / np.sqrt(inverse)
-    squares, vectors = eigh(stiffness, mass, subset_by_index=[0, count - 1])
-    return squares, vectors
+    return _eigenpairs(stiffness, mass, 0, count)
+
+
+def _eigenpairs(a: Array, b: Array, first: int, end: int) -> tuple[Array, Array]:
+    """Some eigenvalues, ascending, and vectors of a x = w b x: with equal bits everywhere where matrices are small."""
+    if len(a) <= SMALL:
+        values, vectors = eigh(a, b)
+        return values[first:end], vectors[:, first:end]
+    from scipy import linalg
+
+    values, vectors = linalg.eigh(a, b, subset_by_index=[first, end - 1])
+    return values, vectors
+
+
+def times(matrix: Any, vectors: Array) -> Array:
+    """Product of a sparse or a dense matrix, which adds in a fixed order where that is sparse or small."""
+    large = hasattr(matrix, "tocsc") or len(vectors) > SMALL
+    return np.asarray(matrix @ vectors if large else product(matrix, vectors))
 
 
 NOTHING_LEFT = 1e-10
@@ -118,7 +136,6 @@ def with_deflections(
     mass: Any, stiffness: Any, rates: Array, vectors: Array, rows: Sequence[int]
 ) -> tuple[Array, Array]:
     """Modes with more: the static deflection by a force at each of some degrees of freedom, less what modes deflect."""
-    from scipy.linalg import eigh
     from scipy.sparse import csc_matrix
     from scipy.sparse.linalg import splu
 
@@ -134,10 +151,10 @@ def with_deflections(
         load = np.zeros(len(vectors))
         load[row] = 1.0
         deflection = factors.solve(load)
-        whole = math.sqrt(deflection @ (mass @ deflection))
+        whole = math.sqrt(product(deflection, times(mass, deflection)))
         for _ in range(2):
-            deflection = deflection - kept @ (kept.T @ (mass @ deflection))
-        size = math.sqrt(deflection @ (mass @ deflection))
+            deflection = deflection - product(kept, product(kept.T, times(mass, deflection)))
+        size = math.sqrt(product(deflection, times(mass, deflection)))
         if not size > NOTHING_LEFT * whole:
             continue
         added.append(deflection / size)
@@ -146,7 +163,7 @@ def with_deflections(
         return rates, vectors
     shapes = np.column_stack(added)
     if len(added) > 1:
-        _, turned = eigh(shapes.T @ (stiffness @ shapes))
-        shapes = shapes @ turned
-    more = [math.sqrt(max(0.0, shape @ (stiffness @ shape))) for shape in shapes.T]
+        _, turned = eigh(product(shapes.T, times(stiffness, shapes)))
+        shapes = product(shapes, turned)
+    more = [math.sqrt(max(0.0, product(shape, times(stiffness, shape)))) for shape in shapes.T]
     return np.append(rates, more), np.column_stack([vectors, shapes])

@@ -5,6 +5,7 @@ from typing import Any
 
 from chaosgym.errors import ParameterError
 from chaosgym.machines.modal_machine.keys import SHAPE, TABLES
+from chaosgym.machines.modal_machine.places import Term, terms_of
 from chaosgym.machines.modal_machine.structure import BASE
 from chaosgym.numbers import shown
 from chaosgym.units import TURNING, turns
@@ -27,15 +28,16 @@ def turning_joints(values: Mapping[str, Any]) -> list[bool]:
     """
     structure = values["structure"]
     shapes = structure.get("shapes", {})
-    points = {name: turns(given, "kg^1/2" if name == BASE else SHAPE.unit) for name, given in shapes.items()}
-    _refuse_bare(shapes, points, "modal_masses" in structure)
+    points = _motions_of(shapes, structure.get("modal_masses"))
     if residual := structure.get("residual"):
         _agree("structure.residual", _motion("structure.residual", residual), str(residual.get("at", "")), points)
-    drives = values["drive"] if isinstance(values["drive"], list) else [values["drive"]]
-    of_drives = [_motion("drive", row) for row in drives]
-    for row, moves in zip(drives, of_drives, strict=True):
-        base = "displacement" in row or "acceleration" in row
-        _agree("drive", moves, str(row.get("at", BASE if base else "")), points)
+    of_drives = []
+    for path in ("drive", "load"):
+        rows = values.get(path, [])
+        for row in rows if isinstance(rows, list) else [rows]:
+            of_drives.append(_motion(path, row))
+            base = "displacement" in row or "acceleration" in row
+            _agree(path, of_drives[-1], str(row.get("at", BASE if base else "")), points)
     joints = values["joint"] if isinstance(values["joint"], list) else [values["joint"]]
     found = []
     for row in joints:
@@ -74,24 +76,54 @@ def _motion(path: str, table: Mapping[str, Any]) -> bool | None:
 
 
 def _agree(path: str, moves: bool | None, place: str, points: Mapping[str, bool | None]) -> None:
-    """Refuse units of a table that do not fit the shape of its point."""
-    words = [place] if place in points else place.replace("-", " ").replace("+", " ").split()
-    for word in words:
+    """Refuse units of a table that do not fit the shapes of the points whose linear combination it concerns."""
+    for _, word, lever in [Term(1.0, place)] if place in points else terms_of(place):
         stated = points.get(word)
-        if moves is not None and stated is not None and stated != moves:
+        moves_there = True if lever else moves
+        if lever and moves:
+            raise ParameterError(
+                f"{path} at {place!r} slides by its radius, and a unit says that it turns; allowed: m, N"
+            )
+        if moves_there is not None and stated is not None and stated != moves_there:
             unit = "kg^1/2" if word == BASE else SHAPE.unit
             raise ParameterError(
-                f"{path} at {place!r} {MOTION[moves]}, and the shape of {word!r} is of a point that {MOTION[stated]}; "
-                f"allowed: a shape in {TURNING[unit] if moves else unit}"
+                f"{path} at {place!r} {MOTION[moves_there]}, and the shape of {word!r} is of a point that "
+                f"{MOTION[stated]}; allowed: a shape in {TURNING[unit] if moves_there else unit}"
             )
 
 
-def _refuse_bare(shapes: Mapping[str, Any], points: Mapping[str, bool | None], with_masses: bool) -> None:
-    """Refuse shapes without a unit, unless modal masses say what they are."""
-    for name, moves in points.items():
-        if moves is None and not with_masses:
-            unit = "kg^1/2" if name == BASE else SHAPE.unit
+def _motions_of(shapes: Mapping[str, Any], masses: Any) -> dict[str, bool | None]:
+    """Whether each point turns by the unit of its shape; modal masses, if any, leave that open of all but the base.
+
+    Refuses shapes whose unit does not go with their scale.
+    """
+    points = {name: turns(given, "kg^1/2" if name == BASE else SHAPE.unit) for name, given in shapes.items()}
+    for name, given in shapes.items():
+        where, unit = f"structure.shapes.{name} = {shown(given)}", "kg^1/2" if name == BASE else SHAPE.unit
+        if masses is None and points[name] is None:
+            beside = "the unit of a mass beside modal_masses" if name == BASE else "none is needed beside modal_masses"
             raise ParameterError(
-                f"structure.shapes.{name} = {shown(shapes[name])} has no unit; write it in {unit}, or in "
-                f"{TURNING[unit]} if it turns (none is needed beside modal_masses)"
+                f"{where} has no unit; write it in {unit}, or in {TURNING[unit]} if it turns ({beside})"
             )
+        if masses is not None and points[name] is not None:
+            allowed = "a mass" if name == BASE else "no unit"
+            raise ParameterError(
+                f"{where} is mass-normalised, as none is beside modal_masses; allowed: {allowed}, or no modal_masses"
+            )
+    if masses is not None and BASE in shapes:
+        points[BASE] = _base_motion(shapes[BASE], bool(turns(masses, "kg")))
+    return points
+
+
+def _base_motion(given: Any, modes_turn: bool) -> bool:
+    """Whether the base turns, by the unit of its participation phi' M r beside modal masses of kg or kg m^2."""
+    unit, crossed = ("kg m^2", "kg m") if modes_turn else ("kg", "kg m")
+    if turns(given, "kg m") is False:
+        return not modes_turn
+    if turns(given, "kg") is not modes_turn:
+        raise ParameterError(
+            f"structure.shapes.base = {shown(given)} has no unit of a mass; beside modal_masses it is what a motion of "
+            f"the base takes along in each mode, the sum of mass times shape: write it in {unit}, or in {crossed} if "
+            f"the base {MOTION[not modes_turn]} (of one body whose shape is 1, its modal mass)"
+        )
+    return modes_turn

@@ -1,4 +1,10 @@
-"""Equations of small motions of a slider crank about its nominal motion: those of its mechanism, in its own order."""
+"""Small motions of a slider crank about its nominal motion: coordinates that its scene requires, and their equations.
+
+Ball clearance opens the rod's end A along the rod and across it, slider clearance opens the slider across the guide,
+both in the frames in which the bearing surfaces stand still. An instrumented slider turns; a flexible rod adds its
+stretch and its modes. With the motor at an angle there is also the motion sideways. The equations are those of the
+crank's mechanism, in the order of these coordinates.
+"""
 
 from typing import NamedTuple
 
@@ -6,9 +12,40 @@ import numpy as np
 
 from chaosgym.arrays import Array
 from chaosgym.machines.mechanism.equations import assembled
-from chaosgym.machines.slider_crank.coordinates import ROD_STRETCH, degrees_of_freedom
 from chaosgym.machines.slider_crank.mechanism import SLIDER, mechanism_of, revolution_of_crank
 from chaosgym.machines.slider_crank.parameters import CrankParameters
+
+BALL_ALONG = "ball along the rod"
+BALL_ACROSS = "ball across the rod"
+ROD_STRETCH = "rod stretch"
+SLIDER_ACROSS = "slider across the guide"
+SLIDER_PITCH = "slider pitch"
+BALL_LATERAL = "ball sideways"
+SLIDER_LATERAL = "slider sideways"
+SLIDER_ROLL = "slider roll"
+SLIDER_YAW = "slider yaw"
+BALL_DIRECTIONS = (BALL_ALONG, BALL_ACROSS, BALL_LATERAL)
+SLIDER_TURNS = (SLIDER_ROLL, SLIDER_YAW, SLIDER_PITCH)
+
+
+def degrees_of_freedom(machine: CrankParameters) -> tuple[str, ...]:
+    """Names of the coordinates that the scene of a machine requires, in their order."""
+    spatial = machine.is_spatial
+    names: list[str] = []
+    if machine.ball_joint != "ideal":
+        names += BALL_DIRECTIONS if spatial else BALL_DIRECTIONS[:2]
+    if machine.rod == "flexible":
+        names.append(ROD_STRETCH)
+    if machine.slider_joint != "ideal":
+        names.append(SLIDER_ACROSS)
+        names += [SLIDER_LATERAL] if spatial else []
+    if machine.slider_joint == "instrumented":
+        names += SLIDER_TURNS if spatial else (SLIDER_PITCH,)
+    if machine.rod == "flexible":
+        modes = range(1, 1 + machine.n_modes + machine.fitted_modes)
+        names += [f"rod mode {i}" for i in modes]
+        names += [f"sideways rod mode {i}" for i in modes] if spatial else []
+    return tuple(names)
 
 
 class Equations(NamedTuple):
@@ -61,7 +98,7 @@ def equations(machine: CrankParameters, crank_angle: Array, load_angle: Array | 
         mechanism,
         revolution_of_crank(machine, mechanism),
         geometric=machine.geometric_stiffness == "on",
-        slides=SLIDER if rubs else "",
+        rubbing=(SLIDER,) if rubs else (),
     )
     # the mechanism has its gaps first, then the stretch and the modes
     order = list(range(len(names)))
@@ -71,6 +108,6 @@ def equations(machine: CrankParameters, crank_angle: Array, load_angle: Array | 
     load = ordered.load_at(crank_angle if load_angle is None else load_angle)
     rate, along = np.zeros(len(crank_angle)), np.zeros((len(crank_angle), len(order)))
     if rubs:
-        rate, along = whole.sliding_at(crank_angle)
-        along = along[:, order]
+        slider = whole.rubbing_at(crank_angle)
+        rate, along = slider.rate[0], slider.motion[0, order].T
     return Equations(*ordered.matrices_at(crank_angle), load[[0, 2]], along, rate)

@@ -15,9 +15,9 @@ from typing import NamedTuple, Protocol
 import numpy as np
 
 from chaosgym.arrays import Array
+from chaosgym.core.binned.model import HERTZ, LINEAR
 from chaosgym.machines.binned import equations
-from chaosgym.machines.slider_crank.coordinates import (
-    BALL_ACROSS,
+from chaosgym.machines.slider_crank.equations import (
     BALL_DIRECTIONS,
     SLIDER_ACROSS,
     SLIDER_LATERAL,
@@ -28,7 +28,7 @@ from chaosgym.machines.slider_crank.coordinates import (
 from chaosgym.machines.slider_crank.parameters import CrankParameters
 
 
-class Contact(NamedTuple):
+class JointContact(NamedTuple):
     """One surface, or two opposite ones.
 
     Attributes
@@ -55,7 +55,7 @@ class Contact(NamedTuple):
     sensors: tuple[tuple[str, ...], tuple[str, ...]] = ((), ())
 
 
-class JointModel(Protocol):
+class CrankJoint(Protocol):
     """A joint: its contacts, which all have the joint's clearance, and its force sensors."""
 
     @property
@@ -67,7 +67,7 @@ class JointModel(Protocol):
         """Equal joints, equal hash: their contacts are kept."""
         ...
 
-    def contacts(self) -> tuple[Contact, ...]:
+    def contacts(self) -> tuple[JointContact, ...]:
         """All contacts of the joint."""
         ...
 
@@ -78,7 +78,7 @@ class TightJoint:
 
     sensors: tuple[str, ...] = ()
 
-    def contacts(self) -> tuple[Contact, ...]:
+    def contacts(self) -> tuple[JointContact, ...]:
         """No contact."""
         return ()
 
@@ -90,12 +90,12 @@ class PlainSlider:
     spatial: bool
     sensors: tuple[str, ...] = ()
 
-    def contacts(self) -> tuple[Contact, ...]:
+    def contacts(self) -> tuple[JointContact, ...]:
         """A pair of surfaces in each direction."""
-        vertical = Contact({SLIDER_ACROSS: _ONE}, np.array([[0.0, -1.0, 0.0]]), slides=True)
+        vertical = JointContact({SLIDER_ACROSS: _ONE}, np.array([[0.0, -1.0, 0.0]]), slides=True)
         if not self.spatial:
             return (vertical,)
-        return vertical, Contact({SLIDER_LATERAL: _ONE}, np.array([[0.0, 0.0, -1.0]]), slides=True)
+        return vertical, JointContact({SLIDER_LATERAL: _ONE}, np.array([[0.0, 0.0, -1.0]]), slides=True)
 
 
 @dataclass(frozen=True)
@@ -123,13 +123,13 @@ class InstrumentedSlider:
             f"{station} {side}" for station in ("front", "rear") for side in ("upper", "lower", "left", "right")
         )
 
-    def contacts(self) -> tuple[Contact, ...]:
+    def contacts(self) -> tuple[JointContact, ...]:
         """Pairs of sensors in the plane, single sensors in space; the two stations share stiffness and damping."""
         stations = (("front", self.distance), ("rear", -self.distance))
         if self.spatial:
             return tuple(contact for station, xi in stations for contact in self._station(station, xi))
         return tuple(
-            Contact(
+            JointContact(
                 {SLIDER_ACROSS: _ONE, SLIDER_PITCH: xi * _ONE},
                 np.array([[0.0, -1.0, 0.0]]),
                 0.5,
@@ -139,13 +139,13 @@ class InstrumentedSlider:
             for station, xi in stations
         )
 
-    def _station(self, station: str, xi: float) -> tuple[Contact, ...]:
+    def _station(self, station: str, xi: float) -> tuple[JointContact, ...]:
         """Four single sensors; each is closed by the motion of its tip against its own side."""
         off = math.copysign(self.offset, xi)
 
-        def sensor(side: str, motion: dict[str, float], force: list[float]) -> Contact:
+        def sensor(side: str, motion: dict[str, float], force: list[float]) -> JointContact:
             rows = {name: value * _ONE for name, value in motion.items()}
-            return Contact(rows, np.array([force]), 0.5, False, True, ((f"{station} {side}",), ()))
+            return JointContact(rows, np.array([force]), 0.5, False, True, ((f"{station} {side}",), ()))
 
         return (
             sensor("upper", {SLIDER_ACROSS: -1.0, SLIDER_PITCH: -xi, SLIDER_ROLL: off}, [0.0, 1.0, 0.0]),
@@ -162,11 +162,11 @@ class SphericalBall:
     spatial: bool
     sensors: tuple[str, ...] = ()
 
-    def contacts(self) -> tuple[Contact, ...]:
+    def contacts(self) -> tuple[JointContact, ...]:
         """One contact, along the ball's eccentricity: minus the motion of the rod's end."""
         names = BALL_DIRECTIONS if self.spatial else BALL_DIRECTIONS[:2]
         axes = np.eye(3)[: len(names), : len(names)]
-        return (Contact(dict(zip(names, -axes, strict=True)), np.eye(3)[: len(names)]),)
+        return (JointContact(dict(zip(names, -axes, strict=True)), np.eye(3)[: len(names)]),)
 
 
 @dataclass(frozen=True)
@@ -194,7 +194,7 @@ class InstrumentedBall:
         normals = [axis + lean * across, axis - lean * across, -axis + lean * sideways, -axis - lean * sideways]
         return np.array(normals) / math.sqrt(3.0)
 
-    def contacts(self) -> tuple[Contact, ...]:
+    def contacts(self) -> tuple[JointContact, ...]:
         """Four sensors; in the plane the two beside it have one displacement and half the lift."""
         normals = self.normals()
         sensors: list[tuple[str, ...]] = [(name,) for name in self.sensors]
@@ -205,7 +205,7 @@ class InstrumentedBall:
         names = BALL_DIRECTIONS if self.spatial else BALL_DIRECTIONS[:2]
         # the ball's eccentricity in its housing is minus the motion of the rod's end
         return tuple(
-            Contact(
+            JointContact(
                 {name: -normal[[axis]] for axis, name in enumerate(names)},
                 normal[None],
                 share,
@@ -219,7 +219,7 @@ class InstrumentedBall:
 _ONE = np.ones(1)
 
 
-def slider_joint_of(machine: CrankParameters) -> JointModel:
+def slider_joint_of(machine: CrankParameters) -> CrankJoint:
     """Model of the slider joint of a machine."""
     if machine.slider_joint == "clearance":
         return PlainSlider(machine.is_spatial)
@@ -228,7 +228,7 @@ def slider_joint_of(machine: CrankParameters) -> JointModel:
     return TightJoint()
 
 
-def ball_joint_of(machine: CrankParameters) -> JointModel:
+def ball_joint_of(machine: CrankParameters) -> CrankJoint:
     """Model of the ball joint of a machine."""
     if machine.ball_joint == "spherical":
         return SphericalBall(machine.is_spatial)
@@ -254,14 +254,14 @@ def joints_of(machine: CrankParameters) -> list[equations.Contact]:
             reading = contact.force * recorded
             share = contact.share
             damped = damper * (share * damping) if linear else damper
-            joints.append(
-                equations.Contact(row, clearance, stiffness * share, damped, contact.two_sided, reading, contact.slides)
-            )
+            rubs = 0 if contact.slides else -1
+            surface = clearance, stiffness * share, damped, contact.two_sided, reading, rubs
+            joints.append(equations.Contact(row, *surface, exponent=LINEAR if linear else HERTZ))
     return joints
 
 
 @lru_cache(maxsize=64)
-def _contacts(joint: JointModel) -> tuple[Contact, ...]:
+def _contacts(joint: CrankJoint) -> tuple[JointContact, ...]:
     return joint.contacts()
 
 
@@ -271,20 +271,9 @@ def gaps_of(machine: CrankParameters) -> Array:
     return np.array([machine.slider_clearance] * slider + [machine.ball_clearance] * ball)
 
 
-def display_of(machine: CrankParameters) -> Array:
-    """Displacement of the monitored joint: of the slider across the guide, or of the rod's end across the rod."""
-    shown = SLIDER_ACROSS if machine.monitored_joint == "slider" else BALL_ACROSS
-    return np.array([float(name == shown) for name in machine.degrees_of_freedom])
-
-
-def sensors_of(machine: CrankParameters) -> tuple[str, ...]:
-    """Names of the force sensors: those of an instrumented slider joint, then those of an instrumented ball joint."""
-    return slider_joint_of(machine).sensors + ball_joint_of(machine).sensors
-
-
 def sensor_peaks(machine: CrankParameters, contact_peak: Array) -> Array:
     """Peak force (cycles, sensors) of each sensor from those of the contacts' two sides, (cycles, contacts, 2)."""
-    names = sensors_of(machine)
+    names = machine.sensors
     peaks = np.zeros((len(contact_peak), len(names)))
     contacts = _contacts(slider_joint_of(machine)) + _contacts(ball_joint_of(machine))
     for j, contact in enumerate(contacts):

@@ -13,16 +13,20 @@ import numpy as np
 from numpy.typing import NDArray
 
 from chaosgym.arrays import Array
-from chaosgym.core.binned.model import HERTZ, LINEAR
+from chaosgym.core import matrices
 from chaosgym.core.cycle import CycleArrays
-from chaosgym.machines.binned.equations import Contact, Held
+from chaosgym.machines.binned.equations import Contact, Held, held, middles_and_nodes
 from chaosgym.machines.binned.model import MAX_SETS
 from chaosgym.machines.parameters import Parameter, parameters_of
-from chaosgym.machines.slider_crank.coordinates import SLIDER_ACROSS, SLIDER_LATERAL, degrees_of_freedom
-from chaosgym.machines.slider_crank.equations import equations
-from chaosgym.machines.slider_crank.joints import display_of, gaps_of, joints_of, sensor_peaks, sensors_of
+from chaosgym.machines.slider_crank.equations import (
+    BALL_ACROSS,
+    SLIDER_ACROSS,
+    SLIDER_LATERAL,
+    degrees_of_freedom,
+    equations,
+)
+from chaosgym.machines.slider_crank.joints import ball_joint_of, gaps_of, joints_of, sensor_peaks, slider_joint_of
 from chaosgym.machines.slider_crank.mechanism import pin_and_pivot
-from chaosgym.machines.slider_crank.model import held_of
 from chaosgym.machines.slider_crank.parameters import FITTED, CrankParameters
 
 if TYPE_CHECKING:
@@ -47,6 +51,10 @@ def _is_fitted(name: str, about: Parameter) -> bool:
     return numbers or (about.provenance == "derived" and about.unit in ("kg", "kg m^2"))
 
 
+FINEST = 0.25
+"""Least crank angle [deg] of a bin of a model that tells the error of another."""
+
+
 @dataclass(frozen=True, kw_only=True)
 class SliderCrank(CrankParameters):
     """The Spatial Slider Crank; the defaults are the planar mechanism of the thesis with clearance at the slider.
@@ -62,6 +70,23 @@ class SliderCrank(CrankParameters):
     >>> crank.cycle_period
     0.3
     """
+
+    @property
+    def finer(self) -> "SliderCrank | None":
+        """The crank with two more modes of the rod and bins of half the angle; see ``Machine.finer``."""
+        interval = 0.5 * self.matrix_update_interval
+        if interval < FINEST:
+            return None
+        modes: dict[str, Any] = {"n_modes": self.n_modes + 2, "fitted_modes": max(1, self.fitted_modes)}
+        return replace(self, matrix_update_interval=interval, **(modes if self.rod == "flexible" else {}))
+
+    @property
+    def models(self) -> "tuple[SliderCrank, ...]":
+        """The rungs standard and fine, and a finer one; the rung draft misses too many natures (``Machine.models``)."""
+        rungs = [self.fidelity_ladder[rung] for rung in ("standard", "fine")]
+        models = [replace(self, **{name: rung[name] for name in self.model_fields}) for rung in rungs]
+        finest = models[-1].finer
+        return (*models, *([] if finest is None else [finest]))
 
     @property
     def round_bearing(self) -> bool:
@@ -104,7 +129,7 @@ class SliderCrank(CrankParameters):
     @property
     def sensors(self) -> tuple[str, ...]:
         """Names of the force sensors of the instrumented joints; ``CycleRecord.sensor_peak`` has their columns."""
-        return sensors_of(self)
+        return slider_joint_of(self).sensors + ball_joint_of(self).sensors
 
     @property
     def clearance_field(self) -> str:
@@ -135,7 +160,13 @@ class SliderCrank(CrankParameters):
 
     def held(self) -> Held:
         """Return the held accelerations, whatever the speed and the clearances."""
-        return held_of(self)
+        middles, nodes = middles_and_nodes(self.bins)
+        found = equations(self, middles, nodes)
+        # friction has the sign of the nominal velocity of the slider, ramped through zero
+        rate = found.slider_rate / (self.friction_ramp * self.crank_radius)
+        friction = self.friction_coefficient * np.clip(rate, -1.0, 1.0)
+        rubs = (friction[:, None] * found.slider_along)[None]
+        return held(found.mass, found.damping, found.stiffness, found.load, rubs)
 
     @property
     def contacts(self) -> list[Contact]:
@@ -150,17 +181,13 @@ class SliderCrank(CrankParameters):
     @property
     def display(self) -> Array:
         """Displacement of the monitored joint: of the slider across the guide, or of the rod's end across the rod."""
-        return display_of(self)
+        shown = SLIDER_ACROSS if self.monitored_joint == "slider" else BALL_ACROSS
+        return np.array([float(name == shown) for name in self.degrees_of_freedom])
 
     @property
     def stiffest(self) -> float:
         """Contact stiffness [N/m]."""
         return self.contact_stiffness
-
-    @property
-    def law(self) -> int:
-        """Law of all contacts."""
-        return LINEAR if self.contact_law == "linear" else HERTZ
 
     @property
     def has_propagators(self) -> bool:
@@ -184,8 +211,7 @@ class SliderCrank(CrankParameters):
         peaks = sensor_peaks(self, arrays.channel_peak) if self.sensors else None
         return {**super().further_results(arrays), "sensor_peak": peaks}
 
-    @property
-    def room(self) -> tuple[float, float]:
+    def room_of(self, joint: int | None = None) -> tuple[float, float]:
         """How far [m] the gap lets the displacement go: a ball among tetrahedral sensors, further than half of it."""
         sensors = self.monitored_joint == "ball" and self.ball_joint == "instrumented"
         gap = float(getattr(self, self.clearance_field)) * (math.sqrt(3.0) if sensors else 1.0)
@@ -211,11 +237,9 @@ def frequencies_at(machine: SliderCrank, crank_angle: float) -> Array:
     >>> frequencies_at(chaosgym.SliderCrank(), 90.0).round(1)
     array([  75.6,  136.2,  549.5, 1167.6, 1542.4])
     """
-    from scipy.linalg import eigh
-
     bound = replace(machine, slider_joint="clearance", ball_joint="ideal", rod="flexible")
     system = equations(bound, np.array([math.radians(crank_angle)]))
     free = [i for i, name in enumerate(bound.degrees_of_freedom) if name not in (SLIDER_ACROSS, SLIDER_LATERAL)]
     at = np.ix_(free, free)
-    squares = eigh(system.stiffness[0, 0][at], system.mass[0][at], eigvals_only=True)
+    squares, _ = matrices.eigh(system.stiffness[0, 0][at], system.mass[0][at])
     return np.asarray(np.sqrt(np.maximum(squares, 0.0)) / (2.0 * math.pi))

@@ -26,9 +26,10 @@ from functools import lru_cache
 import numpy as np
 
 from chaosgym.arrays import Array
+from chaosgym.core import matrices
 from chaosgym.machines.mechanism.beam import END, START, beam_link
 from chaosgym.machines.mechanism.equations import smooth
-from chaosgym.machines.mechanism.joints import ACROSS, ALONG, GROUND, PITCH, ROLL, SIDEWAYS, TURN, YAW, Joint
+from chaosgym.machines.mechanism.joints import ACROSS, ALONG, GROUND, PITCH, ROLL, SIDEWAYS, TURN, YAW, LinkJoint
 from chaosgym.machines.mechanism.links import Beam, Body, Link, rigid_link
 from chaosgym.machines.mechanism.mechanism import Mechanism
 from chaosgym.machines.mechanism.nominal import Revolution, places, refined, revolution_of
@@ -141,11 +142,11 @@ def _damped(machine: CrankParameters, rod: Link) -> Link:
     inertia = np.concatenate([[moving], np.ones(len(modes))])
     ratio: float | Array = machine.damping_ratio
     if machine.damping_family == "power":
-        ratio = ratio * (np.sqrt(stiffness / inertia) / lowest) ** machine.damping_exponent
+        ratio = ratio * matrices.power(np.sqrt(stiffness / inertia) / lowest, machine.damping_exponent)
     return rod._replace(damping=np.diag(2.0 * ratio * np.sqrt(stiffness * inertia)))
 
 
-def _in_plane(machine: CrankParameters) -> tuple[tuple[Link, ...], tuple[Joint, ...]]:
+def _in_plane(machine: CrankParameters) -> tuple[tuple[Link, ...], tuple[LinkJoint, ...]]:
     length = machine.rod_length
 
     def body(name: str, place: float) -> Body:
@@ -167,10 +168,10 @@ def _in_plane(machine: CrankParameters) -> tuple[tuple[Link, ...], tuple[Joint, 
         rod,
         rigid_link(SLIDER, {PIVOT: (0.0, 0.0)}, (body(SLIDER, 0.0),)),
     ), (
-        Joint("motor", "revolute", (GROUND, "shaft"), (CRANK, "shaft"), driven=True),
-        Joint(BALL, "revolute", (CRANK, PIN), (ROD, START), frame=ROD, opened=_ball(machine)),
-        Joint(YOKE, "revolute", (ROD, END), (SLIDER, PIVOT)),
-        Joint(SLIDER, "prismatic", (GROUND, "shaft"), (SLIDER, PIVOT), opened=opened),
+        LinkJoint("motor", "revolute", (GROUND, "shaft"), (CRANK, "shaft"), driven=True),
+        LinkJoint(BALL, "revolute", (CRANK, PIN), (ROD, START), frame=ROD, opened=_ball(machine)),
+        LinkJoint(YOKE, "revolute", (ROD, END), (SLIDER, PIVOT)),
+        LinkJoint(SLIDER, "prismatic", (GROUND, "shaft"), (SLIDER, PIVOT), opened=opened),
     )
 
 
@@ -181,7 +182,7 @@ def _ball(machine: CrankParameters) -> tuple[str, ...]:
     return (ALONG, ACROSS, SIDEWAYS) if machine.is_spatial else (ALONG, ACROSS)
 
 
-def _in_space(machine: CrankParameters) -> tuple[tuple[Link, ...], tuple[Joint, ...]]:
+def _in_space(machine: CrankParameters) -> tuple[tuple[Link, ...], tuple[LinkJoint, ...]]:
     length, tilt = machine.rod_length, math.radians(machine.motor_angle)
 
     def body(name: str) -> tuple[SpatialBody, ...]:
@@ -199,8 +200,10 @@ def _in_space(machine: CrankParameters) -> tuple[tuple[Link, ...], tuple[Joint, 
     roll = machine.slider_roll_inertia - machine.slider_mass * across**2
     slider = SpatialBody(machine.slider_mass, (roll, pitch, pitch), (along, across, 0.0))
 
-    def joint(name: str, kind: str, first: tuple[str, str], second: tuple[str, str], axis: tuple[float, ...]) -> Joint:
-        return Joint(name, kind, first, second, first_axis=axis, second_axis=axis)
+    def joint(
+        name: str, kind: str, first: tuple[str, str], second: tuple[str, str], axis: tuple[float, ...]
+    ) -> LinkJoint:
+        return LinkJoint(name, kind, first, second, first_axis=axis, second_axis=axis)
 
     motor = joint("motor", "revolute", (GROUND, "shaft"), (CRANK, "shaft"), Z)
     guide = joint(SLIDER, "prismatic", (GROUND, "shaft"), (SLIDER, PIVOT), X)

@@ -49,10 +49,13 @@ class CrankParameters(BinnedMachine):
         for rung, modes, fitted, interval in (
             ("draft", 2, 1, 5.0),
             ("standard", 3, 1, 2.0),
-            ("fine", 3, 1, 1.0),
+            ("fine", 4, 1, 1.0),
             ("reference", 5, 1, 0.25),
         )
     }
+
+    model_fields: ClassVar[tuple[str, ...]] = ("n_modes", "fitted_modes", "matrix_update_interval")
+    documented_errors: ClassVar[Mapping[str, float]] = {"draft": 0.01, "standard": 0.01, "fine": 0.005}
 
     name: ClassVar[str] = "slider-crank"
     speed_field: ClassVar[str] = "crank_speed"

@@ -64,7 +64,7 @@ def sketch_of_crank(record: Any, rows: NDArray[np.int64], force_limit: float) ->
         shapes += [Shape("back", bars[None], None, alpha=0.7), Shape("line", moving(path), None)]
     else:
         rod_end = pin + _across(slider - pin) * gap[rows, None]
-        socket = BALL + unit * times * machine.room[1]
+        socket = BALL + unit * times * machine.room_of()[1]
         shapes += [
             Shape("line", moving(at[:, None] + size * CIRCLE), width=1.5)
             for at, size in ((rod_end, socket), (pin, BALL))

@@ -1,0 +1,1 @@
+"""Machines that are not simulated here: plants of classes, of programs behind lines, and of FMUs."""

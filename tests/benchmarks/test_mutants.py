@@ -1,0 +1,73 @@
+"""The sample of changes is the same each time, in proportion to the library, and tried with tests that can fail."""
+
+import ast
+import json
+from itertools import islice
+
+import pytest
+
+pytest.importorskip("mutmut")
+
+from benchmarks import mutants
+from benchmarks.mutants import LIBRARY, Change, chosen_tests, interval, sample, score, shares, wings
+
+
+def test_shares_are_whole_and_add_up():
+    """Largest remainders, by hand: 600 over three sizes."""
+    assert shares({"a": 1, "b": 1, "c": 1}, 10) == {"a": 4, "b": 3, "c": 3}
+    assert shares({"a": 997, "b": 2, "c": 1}, 600) == {"a": 598, "b": 1, "c": 1}
+
+
+def test_the_sample_covers_every_wing_but_kernels():
+    """Each wing by its lines; no kernel, and no test."""
+    modules = wings()
+    assert {"series", "recordings", "machines", "cli", "top"} <= set(modules)
+    paths = {path.relative_to(LIBRARY).as_posix() for paths in modules.values() for path in paths}
+    assert "numbers.py" in paths
+    assert not [path for path in paths if path.startswith(("core/", "envs/kernels/"))]
+    assert all(chosen_tests(wing, "x.py") for wing in modules)
+
+
+def test_a_change_is_one_place_of_a_module_and_the_same_each_time():
+    """It compiles, differs from what is there, and a seed draws it again."""
+    first, again = (list(islice(sample(600, 0), 4)) for _ in range(2))
+    assert first == again
+    assert first != list(islice(sample(600, 1), 4))
+    for change in first:
+        assert isinstance(change, Change)
+        there = (LIBRARY / change.path).read_text()
+        assert ast.dump(ast.parse(change.code)) != ast.dump(ast.parse(there))
+
+
+def test_a_run_that_was_stopped_goes_on(tmp_path, monkeypatch):
+    """Rows that are there are not tried again; a wing whose tests do not pass has no outcome."""
+    tried = []
+
+    def passes(source, tests):
+        tried.append(tests)
+        return "machines" not in tests[-1]
+
+    monkeypatch.setattr(mutants, "passes", passes)
+    monkeypatch.setattr(mutants, "chosen_tests", lambda wing, path: [path, wing])
+    file = tmp_path / "rows.jsonl"
+    mutants.run(file, 30, 0, most=3)
+    mutants.run(file, 30, 0, most=4)
+    rows = [json.loads(line) for line in file.read_text().splitlines()]
+    assert [row["number"] for row in rows] == [*range(7)]
+    assert {row["outcome"] for row in rows if row["wing"] == "machines"} <= {
+        "not tried: the tests of the wing do not pass"
+    }
+    assert {row["outcome"] for row in rows if row["wing"] != "machines"} == {"survives"}
+
+
+def test_the_score_has_its_interval_and_its_denominator(tmp_path):
+    """Wilson (1927), as tabled by Newcombe (1998): 81 of 263 is 0.2553 to 0.3662; what means nothing is left out."""
+    low, high = interval(81, 263)
+    assert (round(low, 4), round(high, 4)) == (0.2553, 0.3662)
+    outcomes = ["noticed", "survives", "noticed", "survives", "not tried: ..."]
+    keys = {"wing": "series", "path": "x", "line": 1, "before": "1", "after": "2"}
+    file = tmp_path / "rows.jsonl"
+    file.write_text("".join(json.dumps(keys | {"number": n, "outcome": o}) + "\n" for n, o in enumerate(outcomes)))
+    found = score(file, equivalent=(3,))
+    assert (found["tried"], found["noticed"], found["wings"]) == (3, 2, {"series": [2, 3]})
+    assert [one["number"] for one in found["survivors"]] == [1]

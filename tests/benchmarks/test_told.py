@@ -1,0 +1,65 @@
+"""A map that is told what was charged, and one that remembers the earlier jobs of its machines."""
+
+import numpy as np
+
+from benchmarks.envs import job_memory
+from benchmarks.envs.job_memory import ENV, FLEET, Keeping
+from benchmarks.envs.told import MIXED, Mixed, Sensed, Told, Watched, _mixed
+from chaosgym.control.controllers.controller import added, place_of, seen
+from chaosgym.control.policies import shipped_policy
+from chaosgym.envs.vector_env import native_envs
+
+
+def test_what_was_charged_stands_where_it_was_charged():
+    """After a held step a map that is told has two thirds of the label at this speed; elsewhere nothing changes."""
+    shares = {}
+    for player in (Watched(), Told(), Sensed(), Mixed()):
+        envs = native_envs(ENV, 2, **FLEET, **player.keywords)
+        observations, _ = envs.reset(seed=[1, 2])
+        player.start(envs)
+        player(observations)
+        held = seen(observations, "speed")[:, None].astype(np.float32)
+        observations, *_ = envs.step(held)
+        player.paid = np.array([1.0, 0.0])
+        shares[type(player)], _ = player.predicted(observations)
+        assert len(player.rows[0][0]) == 2
+    every, at = np.arange(2), place_of(seen(observations, "speed"), envs.task)
+    own, told = shares[Watched], shares[Told]
+    np.testing.assert_allclose(told[every, at], (0.5 * own[every, at] + [1.0, 0.0]) / 1.5)
+    sensed = added(observations, envs.task, "irregular_probability")
+    np.testing.assert_array_equal(player.rows[0][3], sensed)
+    np.testing.assert_allclose(shares[Sensed][every, at], (0.5 * own[every, at] + sensed) / 1.5)
+    mixed = np.array([0.5, 0.8]), np.array([0.5, 0.1])
+    odds = np.exp(MIXED[0]) * np.array([1.0, 4.0 ** MIXED[1] * (1.0 / 9.0) ** MIXED[2]])
+    np.testing.assert_allclose(_mixed(*mixed), odds / (1.0 + odds))
+    assert (shares[Mixed][every, at] != shares[Sensed][every, at]).all()
+    others = np.ones(own.shape, np.bool_)
+    others[every, at] = False
+    np.testing.assert_array_equal(told[others], own[others])
+
+
+def test_a_map_that_remembers_begins_where_it_ended():
+    """Its second jobs begin with what was felt in the first ones, those of the map itself with nothing."""
+    envs = native_envs(ENV, 2, **FLEET, action="speed")
+    observations, _ = envs.reset(seed=[1, 2])
+    policy = shipped_policy(ENV, "fleet")
+    player = Keeping(policy)
+    player.start(envs)
+    assert not policy.memory.any()
+    player(observations)
+    felt = policy.memory
+    assert felt.any()
+    player.start(envs)
+    np.testing.assert_array_equal(policy.memory, felt)
+    policy.start(envs)
+    assert not policy.memory.any()
+
+
+def test_jobs_are_compared_in_pairs(monkeypatch, tmp_path):
+    """In the first job nothing is remembered, so there is no difference; the last row is over the later jobs."""
+    monkeypatch.setattr(job_memory, "FLEET", FLEET | {"steps": 6})
+    first, *_, later = job_memory.job_memory(2, 3, tmp_path / "kept.jsonl")
+    assert first["gain"]["more"] == 0.0
+    assert later["job"] == "2 to 3"
+    assert len((tmp_path / "kept.jsonl").read_text().splitlines()) == 3
+    assert len(job_memory.lines([first, later])) == 4
