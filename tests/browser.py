@@ -107,7 +107,7 @@ class Browser:
         taken = self._call("Page.captureScreenshot", captureBeyondViewport=True, clip=self._whole_page())
         path.write_bytes(base64.b64decode(taken["data"]))
 
-    def wait(self, expression: str, seconds: float = 60.0) -> Any:
+    def wait(self, expression: str, seconds: float = 180.0) -> Any:
         """Value of a JavaScript expression as soon as it is true."""
         end = time.monotonic() + seconds
         while not (value := self.value(expression)):

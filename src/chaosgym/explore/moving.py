@@ -71,7 +71,8 @@ class MovingSketch:
         self._draw()
         play = CustomJS(args={"sources": self._sources, "button": self._button, "panel": self.panel}, code=PLAY)
         self._button.js_on_change("active", play)
-        self._sources["words"].js_on_change("data", play)
+        for source in self._sources.values():
+            source.js_on_change("data", play)
         document.js_on_event("document_ready", CustomJS(args={"button": self._button}, code=CALM), play)
 
     def show(self, view: PointView) -> None:

@@ -59,7 +59,12 @@ class Worker:
                     return
                 kind = min(self._asked, key=len)  # the view before the diagram
                 work, tell = self._asked.pop(kind)
-            answer = work()
+            try:
+                answer = work()
+            except RuntimeError as error:
+                if "interpreter shutdown" in str(error):  # Ctrl-C: no thread can begin any more
+                    return
+                raise
             self._loop.add_callback(self._tell, kind, tell, answer)
 
     def _tell(self, kind: str, tell: Callable[[Any], None], answer: Any) -> None:
