@@ -213,7 +213,7 @@ def test_the_page_stays_alive_while_a_link_is_computed(address, browser):
     hard = "?machine=impact-beam&n_modes=40&contact_stiffness=1e12&excitation_frequency=0.001"
     place = urlparse(base)
     for query in (hard, ""):
-        asked = HTTPConnection("localhost", place.port, timeout=20)
+        asked = HTTPConnection("localhost", place.port, timeout=60)
         asked.request("GET", place.path + query)
         assert asked.getresponse().status == 200
         asked.close()
