@@ -62,7 +62,7 @@ def test_it_is_an_environment(monkeypatch):
     pytest.importorskip("exudyn")
     short = {"run_in_cycles": 3, "cycles_per_step": 2, "lowest_speed": 20.0, "lowest_demand": 20.0}
     env = gym.make(BEAM, **FLEET, **short).unwrapped
-    check_env(env, skip_render_check=True)
+    check_env(env)
     envs = gym.make_vec(BEAM, num_envs=2, **FLEET, **short)
     seen, _ = envs.reset(seed=6)
     np.testing.assert_array_equal(seen[1], env.reset(seed=7)[0])

@@ -48,7 +48,7 @@ def made(plant=Rig, **keywords):
 
 def test_it_is_an_environment():
     """Gymnasium's own check finds nothing; the same seed gives the same job on a plant that has no noise."""
-    check_env(made().unwrapped, skip_render_check=True)
+    check_env(made().unwrapped)
     returns = []
     for _ in range(2):
         env = made()

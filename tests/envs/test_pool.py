@@ -28,7 +28,7 @@ ANY = "chaosgym/AnyMachine-v0"
 
 def test_it_is_an_environment():
     """Gymnasium's own checker has nothing to say."""
-    check_env(gym.make(ANY).unwrapped, skip_render_check=True)
+    check_env(gym.make(ANY).unwrapped)
 
 
 def test_same_seed_same_bytes_alone_and_side_by_side():

@@ -4,7 +4,7 @@ A step is a whole number of operating cycles, so the phase of the force is zero 
 motion goes on from the state in which the last step ended.
 """
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from typing import TYPE_CHECKING, Any, cast
 
@@ -174,12 +174,23 @@ def first_of(info: Mapping[str, NDArray[Any]]) -> dict[str, Any]:
     return {name: values.item() for name, values in info.items()}
 
 
-def refuse_pictures(settings: EnvSettings, render_mode: str | None) -> None:
-    """Raise ``ParameterError`` if pictures are requested of motion that has no unit, or that is not ours."""
-    split = settings.variants.split
-    whose = "any machine" if isinstance(settings.variants, Pool) else f"split = {split!r}"
-    if render_mode is not None and (isinstance(settings.variants, Pool) or split == OTHER_SIMULATOR):
+def metadata_of(settings: EnvSettings, modes: Sequence[str], render_mode: str | None) -> dict[str, Any]:
+    """Return an environment's metadata, whose ``render_modes`` are those possible of ``modes``.
+
+    None is, where motion has no unit or another program moves the machine.
+
+    Raises
+    ------
+    ParameterError
+        If ``render_mode`` is then not None.
+    """
+    split, any_machine = settings.variants.split, isinstance(settings.variants, Pool)
+    if not any_machine and split != OTHER_SIMULATOR:
+        return {**METADATA, "render_modes": list(modes)}
+    if render_mode is not None:
+        whose = "any machine" if any_machine else f"split = {split!r}"
         raise ParameterError(f"render_mode = {render_mode!r} is not possible with {whose}; allowed: None")
+    return {**METADATA, "render_modes": []}
 
 
 def copied(value: Any) -> Any:
@@ -238,7 +249,7 @@ class MachineEnv(JobSpec, gym.Env[Observation, Any]):
     def _take_settings(self, settings: EnvSettings, render_mode: str | None) -> None:
         """Take task, spaces and jobs of some settings."""
         self.render_mode, self.settings = render_mode, settings
-        refuse_pictures(self.settings, render_mode)
+        self.metadata = metadata_of(settings, METADATA["render_modes"], render_mode)
         self.task, self.model = self.settings.task, self.settings.model
         self.nominal = self.settings.variants.nominal
         self.observation_names = tuple(self.task.places)

@@ -341,6 +341,7 @@ class PlantEnv(MachineEnv):
             "reference_force": reference_force,
         }
         self._take_settings(PlantSettings(self.plant, self._name, unit=unit, **said, **keywords), None)
+        self.metadata = {**self.metadata, "render_modes": []}
         self._peaks: list[tuple[float, Array]] = []
         batch: Any = self._job.batch
         self._batch: PlantBatch = batch

@@ -19,7 +19,7 @@ from numpy.typing import NDArray
 from chaosgym.arrays import Indices
 from chaosgym.envs import environment
 from chaosgym.envs.drive import checked_actions
-from chaosgym.envs.machine_env import METADATA, EnvSettings, JobSpec, refuse_pictures, start_of
+from chaosgym.envs.machine_env import EnvSettings, JobSpec, metadata_of, start_of
 from chaosgym.envs.observation import Observation
 from chaosgym.envs.task import Status
 from chaosgym.errors import ParameterError
@@ -93,7 +93,7 @@ class MachineVectorEnv(JobSpec, gym.vector.VectorEnv[Observation, Actions, NDArr
         if autoreset_mode not in (*AutoresetMode, *modes):
             raise ParameterError(f"autoreset_mode = {autoreset_mode!r} is not one of {', '.join(modes)}")
         self.settings = EnvSettings(machine, **keywords)
-        refuse_pictures(self.settings, render_mode)
+        metadata = metadata_of(self.settings, ["rgb_array"], render_mode)
         self.task, self.model = self.settings.task, self.settings.model
         self.nominal = self.settings.variants.nominal
         self.observation_names = tuple(self.task.places)
@@ -109,7 +109,7 @@ class MachineVectorEnv(JobSpec, gym.vector.VectorEnv[Observation, Actions, NDArr
         self._options: tuple[str, ...] = ()
         self.num_envs = num_envs
         self.autoreset_mode = AutoresetMode(autoreset_mode)
-        self.metadata = {**METADATA, "render_modes": ["rgb_array"], "autoreset_mode": self.autoreset_mode}
+        self.metadata = {**metadata, "autoreset_mode": self.autoreset_mode}
         self.single_action_space = self.settings.actions
         self.single_observation_space = self.settings.space
         self.action_space = batch_space(self.settings.actions, num_envs)
