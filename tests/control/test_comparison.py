@@ -1,5 +1,7 @@
 """A comparison keeps one row a job, goes on where it stopped, and scores in pairs; one line evaluates a policy."""
 
+import sys
+
 import numpy as np
 import pyarrow as pa
 import pyarrow.compute
@@ -163,8 +165,25 @@ def test_a_file_whose_statistics_are_missing_is_refused(tmp_path):
     assert others == pytest.approx([first, first])
 
 
-def test_what_is_no_policy_is_refused(tmp_path):
-    """A missing file and a number."""
-    for given in (tmp_path / "none.zip", 3):
-        with pytest.raises(ModelFileError):
-            policy_of(given)
+@pytest.mark.parametrize(
+    ("given", "why"),
+    [("none.zip", "none.zip does not exist"), (3, "3 is no policy"), (Follow, r"Follow is a class; .* Follow\(\)")],
+)
+def test_what_is_no_policy_is_refused(given, why):
+    """A missing file, a number, and a class in the place of a controller."""
+    with pytest.raises(ModelFileError, match=why):
+        policy_of(given)
+
+
+def test_a_model_without_its_library_says_what_to_install(tmp_path, monkeypatch):
+    """A .zip is read by stable-baselines3, which is an extra."""
+    (tmp_path / "model.zip").touch()
+    monkeypatch.setitem(sys.modules, "sb3_contrib", None)
+    with pytest.raises(ModelFileError, match=r"model\.zip needs the extra \[learn\]"):
+        policy_of(tmp_path / "model.zip")
+
+
+def test_more_machines_than_are_kept_are_refused():
+    """One line names how many there are."""
+    with pytest.raises(ParameterError, match="machines = 257 is out of range; allowed: whole numbers from 1 to 256"):
+        chaosgym.evaluate(Follow(), BEAM, machines=257)

@@ -17,6 +17,7 @@ from chaosgym.control.readings import Readings
 from chaosgym.control.rollout import Played, Policy, play
 from chaosgym.control.scores import ONE, ZERO, Scores
 from chaosgym.envs.memory import SpeedMemory
+from chaosgym.envs.vector_env import native_envs
 from chaosgym.errors import ModelFileError
 from chaosgym.files import first_line
 from chaosgym.numbers import whole
@@ -145,8 +146,10 @@ def policy_of(given: Any, **keywords: Any) -> Policy:
     Raises
     ------
     ModelFileError
-        If a file is none of these, or the statistics of its ``VecNormalize`` are missing.
+        If it is none of these, the statistics of its ``VecNormalize`` are missing, or what reads it is not installed.
     """
+    if isinstance(given, type):
+        raise ModelFileError(f"{given.__name__} is a class; allowed: one of it, such as {given.__name__}()")
     if isinstance(given, str | Path):
         path = Path(given)
         return load_policy(path) if path.suffix != ".zip" else _SB3(_loaded(path))
@@ -163,9 +166,12 @@ def _loaded(path: Path) -> Any:
     """Model of a .zip file, whichever algorithm it was trained with."""
     if not path.is_file():
         raise ModelFileError(f"{path} does not exist")
-    import sb3_contrib
-    import stable_baselines3
-    from stable_baselines3.common.save_util import load_from_zip_file
+    try:
+        import sb3_contrib
+        import stable_baselines3
+        from stable_baselines3.common.save_util import load_from_zip_file
+    except ImportError as error:
+        raise ModelFileError(f"{path} needs the extra [learn]: {error}; pip install sb3-contrib") from None
 
     kinds = [getattr(stable_baselines3, name) for name in ALGORITHMS if hasattr(stable_baselines3, name)]
     kinds += [getattr(sb3_contrib, name) for name in ALGORITHMS if hasattr(sb3_contrib, name)]
@@ -213,7 +219,7 @@ def evaluate(
     Raises
     ------
     ParameterError
-        If it is to be guarded and does not know what was usual in training.
+        If it is to be guarded and does not know what was usual in training, or fewer machines are kept.
 
     Examples
     --------
@@ -221,7 +227,7 @@ def evaluate(
     >>> round(follows.deviation, 3)
     0.016
     """
-    machines = whole("machines", machines, 1, 10**6)
+    machines = whole("machines", machines, 1, native_envs(env, **keywords).settings.variants.count)
     runs = policy_of(policy, **keywords)
     runs = GuardedPolicy(runs) if guard else runs
     played = play(runs, env, range(machines), progress=NAME if progress else None, **keywords)

@@ -19,6 +19,7 @@ from gymnasium.spaces import Box, Discrete
 from chaosgym.arrays import Array
 from chaosgym.envs.task import Task
 from chaosgym.errors import ParameterError
+from chaosgym.numbers import shown
 
 MOVES = np.array([0, -1, 1, -2, 2])
 """Trim steps of the discrete actions; one more action goes back to the demand."""
@@ -56,11 +57,12 @@ def checked_actions(task: Task, actions: Any, count: int) -> Array:
     if task.action == "trim":
         fits = given.shape == (count,) and given.dtype.kind in "iuf"
         if not fits or not set(given.tolist()) <= set(range(BACK + 1)):
-            raise ParameterError(f"action = {actions!r} is not usable; allowed: whole numbers from 0 to {BACK}")
+            each = "a whole number" if count == 1 else f"{count} whole numbers"
+            raise ParameterError(f"action = {shown(actions)} is not usable; allowed: {each} from 0 to {BACK}")
         return given[:, None].astype(float)
     width = 2 if task.action == "continuous" else 1
     if given.shape != (count, width) or given.dtype.kind not in "iuf" or not np.isfinite(given).all():
-        raise ParameterError(f"action = {actions!r} is not usable; allowed: {width} finite numbers for each machine")
+        raise ParameterError(f"action = {shown(actions)} is not usable; allowed: {width} finite numbers a machine")
     low, high = (-1.0, 1.0) if task.action == "continuous" else (task.lowest_speed, task.highest_speed)
     rounding = 1e-6 * (high - low)
     if given.min() < low - rounding or given.max() > high + rounding:

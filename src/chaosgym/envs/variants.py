@@ -25,6 +25,7 @@ from chaosgym.errors import ParameterError
 from chaosgym.machines.batch import CompiledBatch
 from chaosgym.machines.machine import Machine
 from chaosgym.machines.parameters import by_field, with_settings
+from chaosgym.numbers import shown
 from chaosgym.version import __version__
 
 HELD_OUT, SEALED = 256, 512
@@ -164,7 +165,7 @@ def numbers_of(given: Any, count: int, kept: int) -> NDArray[np.int64]:
     whole = np.issubdtype(numbers.dtype, np.integer) and numbers.shape in ((), (count,))
     if not whole or numbers.min() < 0 or numbers.max() >= kept:
         raise ParameterError(
-            f"options['machine'] = {given!r} is out of range; allowed: a whole number from 0 to {kept - 1}"
+            f"options['machine'] = {shown(given)} is out of range; allowed: a whole number from 0 to {kept - 1}"
             + (f", or {count} of them" if count > 1 else "")
         )
     return np.broadcast_to(numbers, count).astype(np.int64)
