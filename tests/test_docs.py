@@ -108,3 +108,19 @@ def test_cards_of_shipped_policies_say_what_the_pages_say():
         for score in re.findall(r"\d\.\d\d \(-?\d\.\d\d to \d\.\d\d\)", text):
             low, high = re.findall(r"\((.*) to (.*)\)", score)[0]
             assert score in pages or f"{score.split()[0]} | {low} to {high}" in pages, (card.parent.name, score)
+
+
+def test_the_paper_has_what_the_journal_asks_for():
+    """Sections, length, references that resolve both ways, and no number of a result that the README does not have."""
+    paper, books = ((DOCS / "paper" / name).read_text(encoding="utf-8") for name in ("paper.md", "paper.bib"))
+    sections = re.findall("^# (.+)$", paper, re.MULTILINE)
+    wanted = ("Summary", "Statement of need", "State of the field", "Software design", "Research impact statement")
+    assert sections == [*wanted, "Acknowledgements", "References"]
+    body = paper.split("---", 2)[2]
+    assert 750 <= len(body.split()) <= 1750
+    assert set(re.findall(r"@([a-z]+\d{4})", body)) == set(re.findall(r"^@\w+\{(\w+),", books, re.MULTILINE))
+    readme = (DOCS.parent / "README.md").read_text(encoding="utf-8")
+    results = body.partition("# Research impact statement")[2].partition("# Acknowledgements")[0]
+    numbers = set(re.findall(r"(?<![\w@])\d[\d.,]*(?: %| µs| of \d+)?", results))
+    assert len(numbers) > 8
+    assert [number for number in numbers if number.strip(".,") not in readme] == []
