@@ -13,6 +13,7 @@ import zipfile
 from pathlib import Path
 
 import pytest
+import yaml
 
 ROOT = Path(__file__).parent.parent
 
@@ -274,11 +275,38 @@ def test_the_conda_recipe_has_the_packages_dependencies():
     assert "CHAOSGYM_KERNELS=none" in recipe, "machine code is for one platform"
 
 
-def test_a_release_uploads_no_wheel_that_an_index_refuses():
-    """An index takes no wheel of plain Linux; who has another platform needs the one without machine code."""
-    path = ROOT / ".github/workflows/release.yml"
-    if not (ROOT / ".github").is_dir():
+@pytest.fixture
+def workflows():
+    """Workflows of continuous integration by name."""
+    folder = ROOT / ".github/workflows"
+    if not folder.is_dir():
         pytest.skip("the source archive holds no workflows")
-    steps = path.read_text(encoding="utf-8")
+    return {path.stem: yaml.safe_load(path.read_text(encoding="utf-8")) for path in folder.glob("*.yml")}
+
+
+def test_a_release_uploads_no_wheel_that_an_index_refuses(workflows):
+    """An index takes no wheel of plain Linux; who has another platform needs the one without machine code."""
+    steps = "".join(step.get("run", "") for step in workflows["release"]["jobs"]["build"]["steps"])
     assert "--remove --platform-tag manylinux" in steps
     assert "CHAOSGYM_KERNELS=none python -m build --wheel" in steps
+
+
+def test_workflows_may_read_only_and_name_versions_of_actions(workflows):
+    """A token that may write is asked for by the job that needs it."""
+    jobs = [job for workflow in workflows.values() for job in workflow["jobs"].values()]
+    assert all(workflow["permissions"]["contents"] == "read" for workflow in workflows.values())
+    used = [step["uses"] for job in jobs for step in job["steps"] if "uses" in step]
+    assert [name for name in used if not re.search(r"@(v\d+|release/v\d+|[0-9a-f]{40})$", name)] == []
+
+
+def test_the_versions_of_python_that_are_tried_are_those_that_are_promised(workflows):
+    """Those of the classifiers; the lowest is that of ``requires-python`` and of the installation page."""
+    project = tomllib.loads((ROOT / "pyproject.toml").read_text(encoding="utf-8"))["project"]
+    tried = workflows["test"]["jobs"]["test"]["strategy"]["matrix"]["python"]
+    assert [f"Programming Language :: Python :: {one}" for one in tried] == [
+        line for line in project["classifiers"] if line.startswith("Programming Language :: Python :: 3.")
+    ]
+    assert project["requires-python"] == f">={tried[0]}"
+    assert f"Python {tried[0]} or newer" in (ROOT / "docs/how-to/install.md").read_text(encoding="utf-8")
+    systems = workflows["test"]["jobs"]["platforms"]["strategy"]["matrix"]["os"]
+    assert systems == ["windows-latest", "macos-latest"]
