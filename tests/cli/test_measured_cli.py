@@ -374,7 +374,7 @@ def test_an_acceleration_is_judged_in_its_own_unit(tmp_path):
     assert "in mV, the readings are in g" in err
     code, _, err = run("judge", path, "--load-rating", "500 N")
     assert code == 2
-    assert "asks for a force; state --read scale='100 g/N'" in err
+    assert f"asks for a force; name a column of one by --column, or judge it as it is: chaosgym judge {path}" in err
     assert run("judge", path, "--load-rating", "500 N", "--read", "scale=0.02 g/N")[0] == 0
     code, out, _ = run("judge", path, "--read", "scale=0.02 g/N")
     assert code == 0

@@ -11,6 +11,7 @@ from chaosgym.errors import DiagnosisError
 from chaosgym.recordings.columns import choose_force
 from chaosgym.recordings.quantities import as_unit, split_unit
 from chaosgym.recordings.read import read_recording
+from chaosgym.recordings.runs import ask_for_force
 from tests.recordings.writers import WRITERS
 
 READINGS = np.round(40.0 + 3.0 * np.sin(0.7 * np.arange(40) ** 1.5), 6)
@@ -116,6 +117,46 @@ def test_words_are_units(word, unit):
 def test_a_unit_is_never_a_word_of_a_title(title):
     """The least force is in no minutes, channel A in no amperes."""
     assert split_unit(title) == (title, "")
+
+
+@pytest.mark.parametrize("title", ["acc [m/s^2]", "acc_g", "accX", "Beschleunigung", "vib_mm_s", "pressure", "a [bar]"])
+def test_what_is_no_force_by_its_title_is_never_taken_for_one(title, tmp_path):
+    """No statement of a unit, or of a sensor of forces, makes newtons of an acceleration: no life is told of it."""
+    (path := tmp_path / "a").write_text(f"{title}\n1\n3\n2\n")
+    recording = read_recording(path)
+    assert choose_force(recording).unit != "N"
+    with pytest.raises(DiagnosisError, match=r"N is (one|a unit) of force; (leave unit=N out|state its own, such as)"):
+        choose_force(recording, unit="N")
+    with pytest.raises(DiagnosisError, match="scale = '50 N/FS'"):
+        choose_force(recording, scale="50 N/FS")
+    with pytest.raises(DiagnosisError, match=r"scale = '100 mV/N'|leave unit=V out"):
+        choose_force(recording, unit="V", scale="100 mV/N")
+    with pytest.raises(DiagnosisError, match="this asks for a force; name a column of one by --column, or judge it"):
+        ask_for_force("a", choose_force(recording))
+
+
+@pytest.mark.parametrize(
+    ("title", "unit"),
+    [("force at the accelerometer", "N"), ("accumulated", "N"), ("F / kN", "lbf"), ("weight [kg]", "kgf"), ("x", "mm")],
+)
+def test_a_unit_may_be_stated_of_the_dimension_of_the_title(title, unit, tmp_path):
+    """A word of force counts before others, and what shows kilograms may be a scale of forces."""
+    (path := tmp_path / "a").write_text(f"{title}\n1\n3\n2\n")
+    assert choose_force(read_recording(path), "1", unit).values.max() > 1.0
+
+
+def test_a_title_of_acceleration_beside_a_unit_of_force_is_a_question(tmp_path):
+    """Either may be wrong: the unit of an acceleration settles it."""
+    (path := tmp_path / "a").write_text("accel [N]\n1\n3\n2\n")
+    with pytest.raises(DiagnosisError, match="of acceleration by its title, and N is a unit of force"):
+        choose_force(read_recording(path))
+    assert choose_force(read_recording(path), unit="g").unit == "g"
+
+
+def test_the_force_is_found_beside_an_acceleration(tmp_path):
+    """A column that may be a force goes before one that is none."""
+    (path := tmp_path / "a").write_text("accel,upper\n1,2\n3,1\n2,2\n")
+    assert choose_force(read_recording(path)).name == "upper"
 
 
 def test_columns_may_be_asked_for_by_their_title(tmp_path):

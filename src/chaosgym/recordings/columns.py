@@ -10,7 +10,19 @@ import numpy as np
 
 from chaosgym.arrays import Array
 from chaosgym.errors import DiagnosisError, nearest_or
-from chaosgym.recordings.quantities import CLOCK, FORCES, OTHERS, SPEEDS, VOLTS, as_unit, split_unit
+from chaosgym.recordings.quantities import (
+    CLOCK,
+    DIMENSIONS,
+    FORCES,
+    OTHERS,
+    SAME_LETTERS,
+    SPEEDS,
+    UNKNOWN,
+    VOLTS,
+    as_unit,
+    other_quantity,
+    split_unit,
+)
 from chaosgym.recordings.read import Recording
 
 OTHER = re.compile(
@@ -32,11 +44,16 @@ MOST_SHOWN = 12
 CALIBRATION = re.compile(r"\s*([\d.,]+(?:e[+-]?\d+)?)\s*([^\s/]+(?:/s(?:²|2|\^2))?)\s*(?:/\s*(\S+))?\s*", re.IGNORECASE)
 """A number, a unit and the unit that it is divided by."""
 
+COMMON = {"acceleration": "m/s^2", "velocity": "mm/s", "displacement": "mm", "pressure": "bar", "moment": "Nm"}
+MAY_BE = {**{other: (other,) for other in COMMON}, "vibration": ("acceleration", "velocity", "displacement")}
+"""A unit of each quantity, and what readings may be whose title tells of one."""
+
 
 class Signal(NamedTuple):
     """Readings of one column; ``described`` is one line on where they come from.
 
-    Forces are in newton, times in seconds, any other quantity in the ``unit`` of the file.
+    Forces are in newton, times in seconds, any other quantity in the ``unit`` of the file. Those of which no unit is
+    known, but that they are no forces, are in "units".
     """
 
     values: Array
@@ -81,7 +98,45 @@ def force_names(recording: Recording) -> list[str]:
     usable = [name for name in recording.columns if name not in recording.problems or recording.problems[name]]
     named = [name for name in known if name in usable]
     plain = [name for name in usable if not _speaks_against(recording, name)]
-    return named or plain or [name for name in usable if recording.units.get(name, "") in OTHERS]
+    others = [name for name in usable if recording.units.get(name, "") in OTHERS or _other(recording, name)]
+    return named or plain or others
+
+
+def _other(recording: Recording, name: str) -> str:
+    """As ``other_quantity``; empty where there are no titles."""
+    return other_quantity(name) if recording.named else ""
+
+
+def check_unit(source: str, name: str, stated: str, written: str, other: str) -> None:
+    """Refuse a unit of another dimension than the column has by its title or by its unit in the file.
+
+    Parameters
+    ----------
+    source, name
+        Of the file and of the column, for the message.
+    stated, written
+        The unit that is to hold, and the one that the file has; empty if there is none.
+    other
+        Quantity that the title tells of, as ``other_quantity``.
+
+    Raises
+    ------
+    DiagnosisError
+        If the dimensions differ.
+    """
+    asked, known = DIMENSIONS.get(stated, ""), DIMENSIONS.get(written, "")
+    if other and asked and asked not in (*MAY_BE[other], "voltage", "current"):
+        units = " or ".join(f"unit={COMMON[one]}" for one in MAY_BE[other])
+        cure = f"leave unit={stated} out" if known in MAY_BE[other] else f"state its own, such as --read {units}"
+        raise DiagnosisError(
+            f"{source}: column {name!r} is of {other} by its title, and {stated} is a unit of {asked}; {cure}, or "
+            "correct the title if it is wrong"
+        )
+    if known and asked and asked != known and not other and stated not in SAME_LETTERS.get(written, ()):
+        raise DiagnosisError(
+            f"{source}: column {name!r} is in {written}, a unit of {known}, and {stated} is one of {asked}; leave "
+            f"unit={stated} out, or correct the title if it is wrong"
+        )
 
 
 def _speaks_against(recording: Recording, name: str) -> str:
@@ -91,6 +146,8 @@ def _speaks_against(recording: Recording, name: str) -> str:
     if unit and unit not in FORCES:
         return f"is in {unit}"
     words = [word for word in re.split(r"[\W_\d]+", name) if word] if recording.named else []
+    if other := _other(recording, name):
+        return f"is of {other} by its name"
     if any(OTHER.fullmatch(word) or (CLOCK.fullmatch(word) and rises(finite)) for word in words):
         return "is no force by its name"
     return (
@@ -237,22 +294,30 @@ def _force(recording: Recording, name: str, unit: str | None, scale: str | None)
         raise DiagnosisError(f"{recording.source}, {recording.problems[name]}")
     if name in recording.doubts and not unit:
         raise DiagnosisError(f"{recording.source}: column {name!r} {recording.doubts[name]}; state it: --read unit=N")
-    values, written = recording.columns[name], as_unit(unit or "") or unit or recording.units.get(name, "")
+    own, other = recording.units.get(name, ""), _other(recording, name)
+    values, written = recording.columns[name], as_unit(unit or "") or unit or own
     if written and written not in FORCES and written not in OTHERS and not scale:
         told = "allowed" if unit else "state its unit: --read unit=N"
         listed = ", ".join([*FORCES, *sorted(OTHERS)])
         raise DiagnosisError(
             f"{recording.source}: column {name!r} is in {written}, no unit that is known; {told}: {listed}"
         )
+    check_unit(recording.source, name, written, own, other)
     if is_counter(_finite(values)):
         raise DiagnosisError(f"{recording.source}: column {name!r} rises in equal steps and can't be a force")
-    factor, target = FORCES.get(written or "N", 1.0), "N" if (written or "N") in FORCES else written
-    shown = f"{written}" if written else "taken as N"
-    if unit and (named := recording.units.get(name, written)) != written:
-        shown = f"{written} as stated, instead of {named}"
+    told = written or (UNKNOWN if other else "N")
+    factor, target = FORCES.get(told, 1.0), "N" if told in FORCES else told
+    shown = written or (f"of {other} by its title, whose unit the file does not state" if other else "taken as N")
+    if unit and own not in ("", written):
+        shown = f"{written} as stated, instead of {own}"
     if scale:
         factor, target = calibration(scale, written)
         shown = f"{written or 'no unit'}, {scale.strip()}"
+        if target == "N" and other and DIMENSIONS.get(written) not in MAY_BE[other]:
+            raise DiagnosisError(
+                f"{recording.source}: column {name!r} is of {other} by its title, and scale = {scale!r} makes "
+                "forces of it; leave it out, or correct the title if it is wrong"
+            )
     described = f"{recording.source}: {recording.form}, column {name!r} ({shown}), {len(values)} readings"
     if missing := int(np.count_nonzero(~np.isfinite(values))):
         described += f", {missing} of them missing, the first in {recording.where(int(np.argmin(np.isfinite(values))))}"
@@ -288,9 +353,8 @@ def calibration(scale: str, written: str) -> tuple[float, str]:
         if turned and (quantity in FORCES or quantity in OTHERS):
             force = quantity in FORCES
             return factor * turned * FORCES.get(quantity, 1.0), "N" if force else quantity
-    raise DiagnosisError(
-        f"scale = {scale!r} does not fit readings in {written or 'no unit'}; state theirs: --read unit=V"
-    )
+    cure = "allowed: one of this unit" if written else "state theirs: --read unit=V"
+    raise DiagnosisError(f"scale = {scale!r} does not fit readings in {written or 'no unit'}; {cure}")
 
 
 def _same_kind(written: str, electric: str) -> float:

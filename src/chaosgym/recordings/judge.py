@@ -182,7 +182,8 @@ def _in_unit(verdict: MeasuredVerdict, unit: str) -> MeasuredVerdict:
     def shown(text: str) -> str:
         return re.sub(r"(?<=\d) N\b", f" {unit}", text.replace("the force", "the reading"))
 
-    diagnosis = replace(verdict.diagnosis, reason=shown(verdict.diagnosis.reason))
+    found = verdict.diagnosis
+    diagnosis = replace(found, reason=shown(found.reason), condition=shown(found.condition))
     seen = tuple(feature._replace(text=shown(feature.text)) for feature in verdict.description)
     return replace(verdict, diagnosis=diagnosis, description=seen, notes=tuple(map(shown, verdict.notes)), unit=unit)
 

@@ -12,7 +12,7 @@ import numpy as np
 
 from chaosgym.arrays import Array
 from chaosgym.errors import DiagnosisError
-from chaosgym.recordings.quantities import CLOCK
+from chaosgym.recordings.quantities import CLOCK, UNKNOWN
 from chaosgym.recordings.read import Recording
 from chaosgym.recordings.sampling import choose_time, typical_step
 from chaosgym.units import as_float
@@ -122,6 +122,11 @@ def in_readings(size: float | None, unit: str) -> float | None:
     """
     stated = getattr(size, "unit", unit)
     if stated != unit:
+        if unit == UNKNOWN:
+            raise DiagnosisError(
+                f"the sensor's error is in {stated}, and the file does not state the unit of the readings; state it: "
+                f"--read unit={stated}"
+            )
         raise DiagnosisError(f"the sensor's error is in {stated}, the readings are in {unit}; state both in one unit")
     return size
 

@@ -1,6 +1,7 @@
 """Units as recorders write them, and what a title of a column says: its name and its unit.
 
-A unit is taken from brackets, a row of units or a property, never from a word of a name.
+A unit is taken from brackets, a row of units or a property, never from a word of a name. But a column whose name
+tells of another quantity, such as an acceleration, is never taken for a force.
 """
 
 import re
@@ -24,6 +25,30 @@ _NEVER_JUDGED = ("deg", "°", "°C", "°F", "degC", "degF", "K", "C", "%", "-")
 UNITS = frozenset({*FORCES, *TIMES, *RATES, *SPEEDS, *OTHERS, *_NEVER_JUDGED}) - {"FS"}
 """Units that a file may name."""
 
+_DIMENSIONS = {
+    "force": FORCES,
+    "time": TIMES,
+    "frequency": {*RATES, *SPEEDS},
+    "acceleration": {"g", "m/s²", "m/s2", "m/s^2"},
+    "velocity": {"m/s", "mm/s", "in/s"},
+    "displacement": {"m", "mm", "um", "µm", "in", "mil"},
+    "pressure": {"Pa", "kPa", "MPa", "bar", "psi"},
+    "voltage": VOLTS,
+    "current": {"A", "mA"},
+    "moment": {"Nm", "N·m"},
+    "mass": {"kg", "gram"},
+    "angle": {"deg", "°"},
+    "temperature": {"°C", "°F", "degC", "degF", "K", "C"},
+}
+DIMENSIONS = {unit: dimension for dimension, units in _DIMENSIONS.items() for unit in units}
+"""What each unit measures."""
+
+UNKNOWN = "units"
+"""Stands for the unit of readings that are no forces by their title, where the file states none."""
+
+SAME_LETTERS = {"g": {"gram", "gf"}, "gram": {"gf", "kgf"}, "kg": {"gf", "kgf"}}
+"""Units that may be stated of a file's unit of another dimension: a g may be a gram, and a scale's kg a force."""
+
 _WORDS = {
     "s": "second sec sekunde sekunden",
     "ms": "millisecond milliseconds millis msec",
@@ -40,6 +65,8 @@ _WORDS = {
     "kgf": "kilogram-force kilopond kp",
     "gf": "gram-force",
     "ozf": "ounce-force",
+    "m/s²": "ms2 mps2 m/s/s",
+    "mm/s": "mm_s mmps",
     "kg": "kilogram",
     "gram": "gramme",
     "V": "volt",
@@ -67,6 +94,18 @@ _SUFFIXES = "N kN mN daN lbf kgf gf s ms us ns rpm Hz kHz mV mm um"
 SUFFIXES = frozenset(_SUFFIXES.split())
 """Units that may end a name after an underscore or "in": single letters such as A and V number channels as well."""
 
+_NO_FORCES = {
+    "acceleration": r"(lin|user|raw|tot)?acc([xyz]|el\w*)?|accél\w*|\w*beschleunigung\w*|beschl\w*",
+    "velocity": r"vel|velocity|velocities|geschwindigkeit",
+    "displacement": r"disp|displacement|weg|auslenkung",
+    "vibration": r"vib|vibration\w*",
+    "pressure": r"pressure|druck",
+    "moment": r"torque|drehmoment",
+}
+NO_FORCES = {other: re.compile(words, re.IGNORECASE) for other, words in _NO_FORCES.items()}
+FORCE = re.compile(r"\w*(force|kraft|kräfte)\w*", re.IGNORECASE)
+"""Words in the name of a column of another quantity, which count unless those of a force stand beside."""
+
 CLOCK = re.compile(r"(?-i:t)|time\w*|\w*time|zeit\w*|\w*zeit|temps|\w*stamp|date\w*|datum|clock|elapsed", re.IGNORECASE)
 """Words in the name of a column of instants."""
 
@@ -80,6 +119,21 @@ def as_unit(text: str) -> str:
         return "kN"
     plain = word.casefold()
     return WORDS.get(plain) or WORDS.get(plain.removesuffix("s"), "")
+
+
+def other_quantity(name: str) -> str:
+    """Quantity that a name tells of and that is no force, such as "acceleration" or "pressure"; empty if it tells none.
+
+    Examples
+    --------
+    >>> from chaosgym.recordings.quantities import other_quantity
+    >>> other_quantity("accX"), other_quantity("Beschleunigung 1"), other_quantity("force at the accelerometer")
+    ('acceleration', 'acceleration', '')
+    """
+    words = re.split(r"[\W_\d]+", name)
+    if any(map(FORCE.fullmatch, words)):
+        return ""
+    return next((other for other, told in NO_FORCES.items() if any(map(told.fullmatch, words))), "")
 
 
 def split_unit(title: str) -> tuple[str, str]:
@@ -103,6 +157,8 @@ def split_unit(title: str) -> tuple[str, str]:
     allowed = unit in SUFFIXES if word in UNITS else len(word) > 2 or unit in RATES
     if unit and (allowed or (unit == "min" and CLOCK.fullmatch(name))):
         return name.strip(), unit
+    if text.endswith(("_g", " g")) and other_quantity(text) == "acceleration":
+        return re.sub(r"[ _]+(in[ _]+)?g$", "", text), "g"
     unit = as_unit(text)
     return text, unit if unit in TIMES and len(text) > 1 and text.casefold() != "min" else ""
 

@@ -20,6 +20,7 @@ from chaosgym.recordings.description import Sampled
 from chaosgym.recordings.judge import judge_peaks
 from chaosgym.recordings.kind import Kind, RecordingOptions, in_readings, kind_of
 from chaosgym.recordings.measured_verdict import MeasuredVerdict
+from chaosgym.recordings.quantities import UNKNOWN, VOLTS, other_quantity
 from chaosgym.recordings.read import Recording, read_recording
 
 if TYPE_CHECKING:
@@ -229,11 +230,13 @@ def ask_for_force(source: str, signal: Signal) -> None:
     DiagnosisError
         If they are no forces.
     """
-    if signal.unit != "N":
-        raise DiagnosisError(
-            f"{source}: column {signal.name!r} is in {signal.unit}, and this asks for a force; state "
-            f"--read scale='100 {signal.unit}/N', if it measures one"
-        )
+    if signal.unit == "N":
+        return
+    electric = signal.unit in VOLTS or signal.unit in ("A", "mA", "FS")
+    judge = f"name a column of one by --column, or judge it as it is: chaosgym judge {source}"
+    cure = f"state --read scale='100 {signal.unit}/N', if it measures one" if electric else judge
+    held = f"is of {other_quantity(signal.name)}" if signal.unit == UNKNOWN else f"is in {signal.unit}"
+    raise DiagnosisError(f"{source}: column {signal.name!r} {held}, and this asks for a force; {cure}")
 
 
 def _of_series(

@@ -8,10 +8,10 @@ from collections.abc import Iterable, Iterator
 import numpy as np
 
 from chaosgym.errors import DiagnosisError
-from chaosgym.recordings.columns import calibration
+from chaosgym.recordings.columns import calibration, check_unit
 from chaosgym.recordings.heading import COMMENT, QUOTED, TORN
 from chaosgym.recordings.lines import NUMBER
-from chaosgym.recordings.quantities import FORCES, as_unit, split_unit
+from chaosgym.recordings.quantities import FORCES, as_unit, other_quantity, split_unit
 
 AMBIGUOUS = re.compile(r"[+-]?\d{1,3},\d{3}")
 """1.1, or the columns 1 and 100, or eleven hundred."""
@@ -72,7 +72,9 @@ class LineReader:
         if first and not any(NUMBER.fullmatch(word) for word in words):
             self._names = [split_unit(word)[0].casefold() for word in words]
             place = self._place(words, number, heading=True)
-            unit = split_unit(words[place])[1] if place < len(words) else ""
+            title, unit = split_unit(words[place]) if place < len(words) else ("", "")
+            other, stated = other_quantity(title), self.unit or ""
+            check_unit("standard input", title, "N" if other else as_unit(stated) or stated, unit, other)
             self._factor = self.factor(self.unit or unit)
             return None
         place = self._place(words, number)
