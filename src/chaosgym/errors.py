@@ -3,8 +3,10 @@
 from collections.abc import Iterable
 
 
-def nearest_or(otherwise: str, name: object, known: Iterable[str]) -> str:
+def nearest_or(otherwise: str, name: object, known: Iterable[str], *, alike: float = 0.6) -> str:
     """End of a message about an unknown name: the nearest known one, or what is said ``otherwise``.
+
+    ``alike``, from 0 to 1, is how like it must be.
 
     Examples
     --------
@@ -14,7 +16,7 @@ def nearest_or(otherwise: str, name: object, known: Iterable[str]) -> str:
     """
     from difflib import get_close_matches
 
-    near = get_close_matches(str(name), list(known), n=1)
+    near = get_close_matches(str(name), list(known), n=1, cutoff=alike)
     return f"did you mean {near[0]}?" if near else otherwise
 
 

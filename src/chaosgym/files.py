@@ -38,9 +38,11 @@ def write_atomically(path: Path, write: Callable[[Path], object]) -> None:
     Raises
     ------
     ChaosgymError
-        If there is something under the name that is no file, such as a pipe or a device.
+        If there is something under the name that is no file, such as a pipe or a device, or its folder is none.
     """
     target = replaceable(path)
+    if not target.parent.is_dir():
+        raise ChaosgymError(f"{target.parent} is no folder; make it first, or choose another one")
     temporary = target.with_name(f".{target.name}.{os.getpid()}.{OWN_END}")
     try:
         mode = stat.S_IMODE(target.stat().st_mode) if target.exists() else None

@@ -223,7 +223,7 @@ def parse_option(name: str, text: str, unit: str, bare: str) -> float:
         except ValueError:
             listed = ", ".join(filter(None, units_of(unit)))
             told = f", nor one with a unit ({listed})" if listed else ""
-            raise ParameterError(f"{name}: {text!r} is not a valid float{told}") from None
+            raise ParameterError(f"{name}: {text!r} is no number{told}") from None
     return parse_quantity(name, f"{value!r} {written or bare}", unit) if written or bare else value
 
 

@@ -132,8 +132,13 @@ def test_simulated_series_are_read_back(tmp_path):
     ("arguments", "message"),
     [
         (("judge", "-", "--sensor-error", "inf"), "is no finite number"),
-        (("judge", "-", "--sensor-error", "3 furlong"), "unknown unit 'furlong' (allowed: N, kN"),
+        (("judge", "-", "--sensor-error", "3 furlong"), "is in furlong, no unit that is known; allowed: N, kN"),
         (("judge", "-", "--sensor-error", "3 m"), "in m, the readings are in N"),
+        (
+            ("judge", "-", "--read", "unit=Newtn"),
+            "column 'column 1' is in Newtn, no unit that is known; did you mean newton?",
+        ),
+        (("judge", "-", "--frequncy-hz", "3"), "judge has no option --frequncy-hz; allowed: --column, --as, --rate-hz"),
         (("diagnose", "impact-beam", "--sensor-error", "inf"), "is no finite number"),
         (("diagnose", "impact-beam", "--sensor-error", "3 m"), "unknown unit 'm' (allowed: N, kN"),
         (("judge", "-", "--cycle", "20"), "--cycle = '20' has no unit (allowed: Hz, kHz, rpm, s, ms"),
@@ -355,6 +360,30 @@ def test_a_sweep_that_is_none_is_refused_in_one_line(tmp_path, text, options, me
     assert (code, out) == (2, "")
     assert message in err
     assert err.rstrip().splitlines()[-1].startswith("Error: ")
+
+
+def test_the_unit_of_a_column_is_asked_for_where_it_is_unknown():
+    """The one column of readings is found, so that its unit is what is left to state."""
+    table = "cycle,force [furlong]\n" + "".join(f"{n},{40 + n % 2}\n" for n in range(60))
+    code, _, err = run("judge", "-", stdin=table)
+    assert code == 2
+    assert "column 'force' is in furlong, no unit that is known; state its unit, such as --read unit=N" in err
+    assert run("judge", "-", "--read", "unit=N", stdin=table)[0] == 0
+
+
+@pytest.mark.parametrize(
+    ("error", "stated"),
+    [("0.05 m/s2", 0.05), ("0.05 m/s^2", 0.05), ("5e-2m/s²", 0.05), ("0.05g", 0.49), ("0.05 g", 0.49)],
+)
+@pytest.mark.parametrize("unit", ["m/s^2", "m/s²", "g"])
+def test_the_error_of_a_sensor_is_understood_in_every_spelling(unit, error, stated):
+    """Half a hundredth of g is 0.49 m/s², in readings of either unit."""
+    rng = np.random.default_rng(0)
+    readings = "".join(f"{a:.6f}\n" for a in 3.0 + 0.001 * rng.normal(size=60))
+    code, out, err = run("judge", "-", "--sensor-error", error, "--json", stdin=f"acc [{unit}]\n{readings}")
+    assert code == 0, err
+    told = json.loads(out)["sensor_error"]["half_width"]
+    assert told == pytest.approx(stated / (9.80665 if unit == "g" else 1.0), rel=1e-2)
 
 
 def test_an_acceleration_is_judged_in_its_own_unit(tmp_path):

@@ -542,7 +542,10 @@ def test_command_evaluates_measured_peaks(run, tmp_path):
         ((), "give a brief"),
         (("--template", "impact-bean"), "did you mean impact-beam?"),
         (("absent.toml",), "can't be read"),
-        (("absent.toml", "--out", "report.txt"), "ends in .html or .pdf"),
+        (
+            ("absent.toml", "--out", "report.txt"),
+            "'report.txt' is no name of a report; allowed: names that end in .html or .pdf",
+        ),
     ],
 )
 def test_wrong_usage_is_one_line_and_code_2(run, arguments, message):

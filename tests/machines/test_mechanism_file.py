@@ -307,6 +307,9 @@ def test_missing_tables_and_a_mechanism_without_clearance(file_of):
     path.write_text("[ground]\npoints = {}\n")
     with pytest.raises(ParameterError, match=r"\[link\] is missing"):
         chaosgym.read_machine(path)
+    path.write_text("[ground]\n[link.crank]\n[operation]\n[[joints]]\n")
+    with pytest.raises(ParameterError, match=r"no table 'joints'; did you mean \[\[joint\]\]\?"):
+        chaosgym.read_machine(path)
     path.write_text("[ground]\n[link.crank]\n[operation]\n")
     with pytest.raises(ParameterError, match=r"\[\[joint\]\] is missing"):
         chaosgym.read_machine(path)

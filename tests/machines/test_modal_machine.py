@@ -259,7 +259,9 @@ def test_modes_of_a_universal_file(machine_file, tmp_path):
 
 BAD = {
     "an unknown key": ([("clearance = \"0.15", "clearence = \"0.15")], "did you mean clearance"),
-    "an unknown table": ([("[joint]", "[joints]")], "[joint] is missing"),
+    "an unknown table": ([("[joint]", "[joints]")], "no table 'joints'; did you mean [joint], or [[joint]]"),
+    "another unknown table": ([("[[drive]]\nat", "[[drives]]\nat")], "no key 'drives'; did you mean [[drive]]?"),
+    "no damper": ([("damping = \"60", "# damping = \"60")], "lacks damping; in place of damping, restitution"),
     "no unit": ([('"0.15 mm"', "0.15")], "joint.clearance = 0.15 has no unit"),
     "a wrong unit": ([('"0.15 mm"', '"0.15 kg"')], "unknown unit 'kg'"),
     "a negative gap": ([('"0.15 mm"', '"-0.15 mm"')], "gap of negative width"),
@@ -278,6 +280,13 @@ BAD = {
     "two tables": ([("[joint]", "[joint]\n[[joint]]")], "; allowed: each key once, and [[NAME]]"),
     "a number of no task": ([("# [job]", "[job]"), ("# reference_force", "referense_force")], None),
 }  # fmt: skip
+
+
+def test_a_field_that_is_none_is_told_by_the_name_of_the_file(machine_file):
+    """A person knows the machine by its file, not by its class."""
+    path = machine_file()
+    with pytest.raises(ParameterError, match=rf"{path} has no field 'clearence'; did you mean clearance\?"):
+        with_settings(chaosgym.read_machine(path), {"clearence": 1e-4})
 
 
 def test_shapes_whose_largest_entry_is_one_are_told(machine_file):

@@ -11,7 +11,7 @@ from chaosgym.branches.orbit_family import CLOSELY, OrbitFamily
 from chaosgym.core import matrices
 from chaosgym.errors import ParameterError, SimulationError
 from chaosgym.machines import Machine
-from chaosgym.machines.parameters import USUAL, check_parameter, field_named, parameters_of, suggestion
+from chaosgym.machines.parameters import USUAL, check_parameter, field_named, name_of, parameters_of, suggestion
 
 UNMOVED = 1e-13
 """Change of s that changes nothing but the rounding of a model."""
@@ -59,7 +59,7 @@ def continuous_field(machine: Machine, name: str) -> str:
     numbers: list[str] = [key for key, about in known.items() if not about.choices and _continuous(machine, key)]
     if field not in numbers:
         hint = suggestion(name, [*USUAL, *numbers])
-        raise ParameterError(f"{type(machine).__name__} has no field {name!r} that varies continuously{hint}")
+        raise ParameterError(f"{name_of(machine)} has no field {name!r} that varies continuously{hint}")
     return field
 
 

@@ -57,6 +57,9 @@ MOVED = {
 }
 """Former commands, and what to call instead."""
 
+ALIKE = 0.7
+"""How alike an option must be to the one that was written, from 0 to 1, to be the one that was meant."""
+
 RARELY = 50_000
 """New objects after which garbage is looked for: imports make many that stay, and a search each 700 takes a tenth."""
 
@@ -136,6 +139,8 @@ def run_command(command: click.Command) -> None:
             _end(f"a file ended too early: {stop.__cause__}", 1)
         click.echo("Aborted.", err=True)
         sys.exit(ABORTED)
+    except click.NoSuchOption as error:
+        _end(_unknown_option(error), error.exit_code)
     except click.ClickException as error:
         _end(error.format_message(), error.exit_code)
     except (SimulationError, UnfinishedError) as error:
@@ -147,6 +152,15 @@ def run_command(command: click.Command) -> None:
     except OSError as error:
         _drop_unwritten_output()
         _end(error, 1 if error.errno in BEYOND_THE_USER else 2)
+
+
+def _unknown_option(error: click.NoSuchOption) -> str:
+    """What to say of an option that a command has not: the one that was meant, or all."""
+    if error.ctx is None:
+        return error.format_message()
+    known = [name for one in error.ctx.command.get_params(error.ctx) for name in one.opts if name.startswith("--")]
+    hint = nearest_or(f"allowed: {', '.join(known)}", error.option_name, known, alike=ALIKE)
+    return f"{error.ctx.command_path} has no option {error.option_name}; {hint}"
 
 
 def _use_one_blas_thread() -> None:

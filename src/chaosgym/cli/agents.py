@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
-from chaosgym.cli.options import Quantity
+from chaosgym.cli.options import IntRange, Quantity
 from chaosgym.cli.output import AS_JSON, DIAGNOSED, announce, emit, patience, picture_path, plot_option
 
 if TYPE_CHECKING:
@@ -38,7 +38,7 @@ NO_POLICY = (
 @click.option(
     "--out", type=click.Path(dir_okay=False, path_type=Path), required=True, help="Parquet file; goes on from there."
 )
-@click.option("--machines", type=click.IntRange(2, 512), default=None, help="Of those kept for this; all by default.")
+@click.option("--machines", type=IntRange(2, 512), default=None, help="Of those kept for this; all by default.")
 @click.option(
     "--objective", type=click.Choice(OBJECTIVES), default=OBJECTIVES[0], show_default=True, help="What costs."
 )
@@ -113,7 +113,7 @@ def compare(
 )
 @click.option(
     "--machine",
-    type=click.IntRange(0, 255),
+    type=IntRange(0, 255),
     default=0,
     show_default=True,
     help="Of those kept for this; with --plant it draws the demands.",

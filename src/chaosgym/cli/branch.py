@@ -8,7 +8,7 @@ import click
 import numpy as np
 
 from chaosgym.cli.machine_options import machine_command, model_over
-from chaosgym.cli.options import FloatRange
+from chaosgym.cli.options import FloatRange, IntRange
 from chaosgym.cli.output import (
     DIAGNOSED,
     WORKERS,
@@ -46,7 +46,7 @@ FIRST = "branch, before it follows orbits"
 )
 @click.option(
     "--longest-period",
-    type=click.IntRange(1, 64),
+    type=IntRange(1, 64),
     default=4,
     show_default=True,
     help="Longest period [cycles] of a branch that begins at a flip.",

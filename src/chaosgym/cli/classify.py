@@ -10,7 +10,7 @@ import click
 
 from chaosgym.cli.judge import run_lines
 from chaosgym.cli.machine_options import machine_command
-from chaosgym.cli.options import FloatRange, recording_options
+from chaosgym.cli.options import FloatRange, IntRange, recording_options
 from chaosgym.cli.output import AS_JSON, emit, patience, picture_path, plot_option
 
 if TYPE_CHECKING:
@@ -196,7 +196,7 @@ def _classify_batch(
     help="Folder of a finished sweep; repeatable, one classifier each.",
 )
 @click.option("--out", type=click.Path(), required=True, help="New folder: classifier, report and card; one a machine.")
-@click.option("--seed", type=click.IntRange(0), default=0, show_default=True)
+@click.option("--seed", type=IntRange(0), default=0, show_default=True)
 @AS_JSON
 def train_classifier(data: tuple[str, ...], out: str, seed: int, as_json: bool) -> None:
     """Train the classifier on a sweep and judge it on machines held out (needs the extra [learn])."""

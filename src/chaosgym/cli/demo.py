@@ -5,12 +5,13 @@ from typing import Any
 import click
 
 from chaosgym.cli.machine_options import machine_command, model_over
+from chaosgym.cli.options import IntRange
 from chaosgym.cli.output import AS_JSON, DIAGNOSED, announce, emit
 
 
 @click.command()
 @click.option("--out", type=click.Path(file_okay=False), default="chaosgym-demo", show_default=True, help="New folder.")
-@click.option("--seed", type=click.IntRange(0), default=0, show_default=True)
+@click.option("--seed", type=IntRange(0), default=0, show_default=True)
 @click.option("--train", is_flag=True, help="Train the agent, for some minutes, rather than take the shipped one.")
 @AS_JSON
 def demo(out: str, seed: int, train: bool, as_json: bool) -> None:
@@ -24,7 +25,7 @@ def demo(out: str, seed: int, train: bool, as_json: bool) -> None:
 
 
 @machine_command(required=False, chooses="range")
-@click.option("--port", type=click.IntRange(0, 65535), default=5006, show_default=True, help="0: any that is free.")
+@click.option("--port", type=IntRange(0, 65535), default=5006, show_default=True, help="0: any that is free.")
 @click.option("--browser/--no-browser", default=True, show_default=True, help="Open the page in the usual browser.")
 def explore(machine: Any, port: int, browser: bool, as_json: bool) -> None:
     """Drag sliders and watch motion, forces, verdict and calm speeds of a machine; Ctrl-C ends (extra [explore])."""

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 import click
 
 from chaosgym.cli.machine_options import INITIAL_STATE, stated_state
-from chaosgym.cli.options import recording_options
+from chaosgym.cli.options import IntRange, recording_options
 from chaosgym.cli.output import (
     AS_JSON,
     DIAGNOSED,
@@ -37,7 +37,7 @@ if TYPE_CHECKING:
 @click.option("--overwrite", is_flag=True, help="Replace files that exist.")
 @click.option("--verdict-only", is_flag=True, help="Leave map, margins and changes out; it is soon there.")
 @plot_option()
-@click.option("--seed", type=click.IntRange(0), default=0, show_default=True, help="Of the machines in tolerance.")
+@click.option("--seed", type=IntRange(0), default=0, show_default=True, help="Of the machines in tolerance.")
 @WORKERS
 @AS_JSON
 def design(

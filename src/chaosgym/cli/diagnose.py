@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING, Any
 import click
 
 from chaosgym.cli.machine_options import machine_command
-from chaosgym.cli.options import FORCE_ERROR, FloatRange
+from chaosgym.cli.options import FORCE_ERROR, FloatRange, IntRange
 from chaosgym.cli.output import (
     DIAGNOSED,
     announce,
@@ -36,7 +36,7 @@ Part = tuple[dict[str, Any], list[str]]
     show_default=True,
     help="All tests in stages, or the Two-Step Test or the Matrix Update Test alone.",
 )
-@click.option("--budget", type=click.IntRange(100, 10**7), default=3200, show_default=True, help="Cycles at the most.")
+@click.option("--budget", type=IntRange(100, 10**7), default=3200, show_default=True, help="Cycles at the most.")
 @click.option("--types", is_flag=True, help="Also tell the response type (I, II, III) over the tolerances.")
 @click.option("--margins", is_flag=True, help="Also tell how far each tolerance is from a loss of stability.")
 @click.option(
@@ -47,7 +47,7 @@ Part = tuple[dict[str, Any], list[str]]
     help="Tolerances up to which margins are looked for.",
 )
 @click.option(
-    "--kicks", type=click.IntRange(1, 10**5), help="Also try so many knocks, for the smallest that leaves; and margins."
+    "--kicks", type=IntRange(1, 10**5), help="Also try so many knocks, for the smallest that leaves; and margins."
 )
 @FORCE_ERROR
 @plot_option()

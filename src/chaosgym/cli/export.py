@@ -6,13 +6,14 @@ from typing import Any
 import click
 
 from chaosgym.cli.machine_options import machine_command
+from chaosgym.cli.options import IntRange
 from chaosgym.cli.output import check_target, emit
 
 
 @machine_command
 @click.option("--fmu", type=click.Path(dir_okay=False, path_type=Path), required=True, help="File to write, NAME.fmu.")
 @click.option(
-    "--samples", type=click.IntRange(1, 10**5), default=256, show_default=True, help="Instants of its motion, a cycle."
+    "--samples", type=IntRange(1, 10**5), default=256, show_default=True, help="Instants of its motion, a cycle."
 )
 @click.option("--overwrite", is_flag=True, help="Replace the file if it exists.")
 def export(machine: Any, fmu: Path, samples: int, overwrite: bool, as_json: bool) -> None:

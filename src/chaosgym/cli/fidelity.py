@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any
 import click
 
 from chaosgym.cli.machine_options import machine_command
-from chaosgym.cli.options import FloatRange
+from chaosgym.cli.options import FloatRange, IntRange
 from chaosgym.cli.output import WORKERS, announce, emit, patience, seconds_of, verdict_lines
 
 if TYPE_CHECKING:
@@ -17,9 +17,9 @@ FOLDER = click.Path(file_okay=False, path_type=Path)
 
 
 @machine_command
-@click.option("--points", type=click.IntRange(1, 1000), default=60, show_default=True, help="Operating points.")
-@click.option("--cycles", type=click.IntRange(20, 10**5), default=200, show_default=True, help="Cycles that count.")
-@click.option("--transient", type=click.IntRange(0, 10**5), default=100, show_default=True, help="Cycles before them.")
+@click.option("--points", type=IntRange(1, 1000), default=60, show_default=True, help="Operating points.")
+@click.option("--cycles", type=IntRange(20, 10**5), default=200, show_default=True, help="Cycles that count.")
+@click.option("--transient", type=IntRange(0, 10**5), default=100, show_default=True, help="Cycles before them.")
 @click.option(
     "--budget",
     type=FloatRange(0.0, min_open=True),

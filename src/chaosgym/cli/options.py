@@ -1,6 +1,7 @@
 """Types of options, with units or in a range, and the options of a file of readings, the same for every command."""
 
 import functools
+import re
 from collections.abc import Callable, Iterable, Mapping
 from typing import Any, NamedTuple
 
@@ -65,16 +66,26 @@ class Reading(Quantity):
     def convert(self, value: Any, param: click.Parameter | None, ctx: click.Context | None) -> float:
         """Return a bare number as it is, or an ``InUnit``."""
         from chaosgym.recordings.kind import InUnit
-        from chaosgym.recordings.quantities import OTHERS
+        from chaosgym.recordings.quantities import FORCES, OTHERS, as_unit
+        from chaosgym.units import as_float
 
-        number, _, unit = value.strip().rpartition(" ") if isinstance(value, str) else ("", "", "")
-        if unit not in OTHERS:
-            newtons = super().convert(value, param, ctx)
-            return InUnit(newtons, "N") if isinstance(value, str) and value.strip()[-1].isalpha() else newtons
+        found = re.fullmatch(r"\s*([-+]?[\d.]++(?:[eE][-+]?\d++)?+)\s*([^\s,_].*?)\s*", str(value))
+        unit = (as_unit(found[2]) or found[2]) if found else ""
+        if found is None:
+            return super().convert(value, param, ctx)
+        name, allowed = param.opts[0] if param else "value", [*FORCES, *sorted(OTHERS)]
+        if unit not in allowed:
+            hint = nearest_or(f"allowed: {', '.join(allowed)}", found[2], allowed)
+            raise click.UsageError(f"{name} = {value!r} is in {found[2]}, no unit that is known; {hint}", ctx)
         try:
-            return InUnit(number, unit)
+            size = as_float(found[1])
         except ValueError:
-            raise click.UsageError(f"{param.opts[0] if param else 'value'} {value!r} is no number", ctx) from None
+            raise click.UsageError(f"{name} {value!r} is no number", ctx) from None
+        return InUnit(size * FORCES[unit], "N") if unit in FORCES else InUnit(size, unit)
+
+
+LARGEST = 1e12
+"""Whole number from which on its digits are no help."""
 
 
 class FloatRange(click.FloatRange):
@@ -82,10 +93,31 @@ class FloatRange(click.FloatRange):
 
     def convert(self, value: Any, param: click.Parameter | None, ctx: click.Context | None) -> float:
         """Return the number."""
-        number = float(super().convert(value, param, ctx))
+        try:
+            number = float(super().convert(value, param, ctx))
+        except click.BadParameter as error:
+            self.fail(error.message.replace("is not a valid float range", "is no number"), param, ctx)
         if number != number or "_" in str(value):
             self.fail(f"{value!r} is no number.", param, ctx)
         return number
+
+
+class IntRange(click.IntRange):
+    """A whole number in a range; what is written as ``1e3`` or ``1.0`` is said as it should be."""
+
+    def convert(self, value: Any, param: click.Parameter | None, ctx: click.Context | None) -> int:
+        """Return the number."""
+        if isinstance(value, str) and not re.fullmatch(r"\s*[-+]?\d+\s*", value, re.ASCII):
+            try:
+                meant = float(value)
+            except ValueError:
+                meant = 0.5
+            cure = f"write {meant:.0f}" if meant.is_integer() and abs(meant) < LARGEST else f"write {self._example()}"
+            self.fail(f"{value!r} is no whole number; {cure}.", param, ctx)
+        return int(super().convert(value, param, ctx))
+
+    def _example(self) -> str:
+        return "digits alone" if self.max is None else f"digits alone, up to {self.max}"
 
 
 FILE = click.argument("file", metavar="FILE")
@@ -119,7 +151,7 @@ KEYS = {
     "cycle": Fact("period", CycleLength(), "'30 Hz'", "Cycle of a series; without it, estimated from the series."),
     "tachometer": Fact("tachometer", click.STRING, "NAME", "Column with a tachometer's pulses; a turn is a cycle."),
     "pulses-per-revolution": Fact(
-        "pulses_per_revolution", click.IntRange(1, 100_000), "60", "Pulses of the tachometer in a turn; default 1."
+        "pulses_per_revolution", IntRange(1, 100_000), "60", "Pulses of the tachometer in a turn; default 1."
     ),
     "sensor-error": Fact("sensor_error", Reading("N"), "'1 N'", ERROR),
     "sensor-sigma": Fact("sensor_sigma", Reading("N"), "'0.3 N'", SIGMA),

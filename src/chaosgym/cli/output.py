@@ -12,15 +12,15 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
+from chaosgym.cli.options import IntRange
+
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
     from numpy.typing import ArrayLike
 
 AS_JSON = click.option("--json", "as_json", is_flag=True, help="Print one JSON object.")
 
-WORKERS = click.option(
-    "--workers", type=click.IntRange(1, 4096), default=None, help="Threads; default: all processors."
-)
+WORKERS = click.option("--workers", type=IntRange(1, 4096), default=None, help="Threads; default: all processors.")
 
 NOBODY_READS = 141
 """Exit code where the reader of standard output has gone, as of any program that a broken pipe ends."""

@@ -8,15 +8,16 @@ import click
 import numpy as np
 
 from chaosgym.cli.machine_options import machine_command
+from chaosgym.cli.options import IntRange
 from chaosgym.cli.output import AS_JSON, announce, check_target, emit, picture_path, plot_option, write_table
 
 
 @machine_command(chooses="point")
-@click.option("--cycles", type=click.IntRange(1, 10**7), default=100, show_default=True, help="Cycles to record.")
-@click.option("--transient", type=click.IntRange(0, 10**7), default=0, show_default=True, help="Cycles to skip first.")
+@click.option("--cycles", type=IntRange(1, 10**7), default=100, show_default=True, help="Cycles to record.")
+@click.option("--transient", type=IntRange(0, 10**7), default=0, show_default=True, help="Cycles to skip first.")
 @click.option("--out", type=click.Path(dir_okay=False), help="Peak force of every cycle, all sides: CSV or Parquet.")
 @click.option("--series-out", type=click.Path(dir_okay=False), help="Force and motion over time: CSV or Parquet.")
-@click.option("--samples", type=click.IntRange(8, 10**5), default=256, show_default=True, help="A cycle, --series-out.")
+@click.option("--samples", type=IntRange(8, 10**5), default=256, show_default=True, help="A cycle, --series-out.")
 @click.option("--overwrite", is_flag=True, help="Replace these files if they exist.")
 @plot_option()
 def simulate(

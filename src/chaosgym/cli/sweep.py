@@ -8,7 +8,7 @@ import click
 
 from chaosgym.cli import Group
 from chaosgym.cli.machine_options import machine_command, millimetres_meant, model_over
-from chaosgym.cli.options import Fact, stated
+from chaosgym.cli.options import Fact, IntRange, stated
 from chaosgym.cli.output import AS_JSON, DIAGNOSED, announce, emit, picture_path, plot_option
 
 SAMPLED = 9
@@ -18,7 +18,7 @@ LABELS = {
     "full-types": Fact(
         "full_types", click.FLOAT, "1", "share typed over all tolerances; left out, 1 on a coarse grid of a minute"
     ),
-    "initial-states": Fact("initial_states", click.IntRange(1), "48", "random starts of these types"),
+    "initial-states": Fact("initial_states", IntRange(1), "48", "random starts of these types"),
     "definition": Fact(
         "definition",
         click.Choice(["settled", "thesis"]),
@@ -61,7 +61,7 @@ class SamplingRule(click.ParamType):  # type: ignore[type-arg]
         return kind, size, seed
 
 
-class Workers(click.IntRange):
+class Workers(IntRange):
     """A number of threads, or the address of a Dask scheduler."""
 
     def __init__(self) -> None:
@@ -91,7 +91,7 @@ class Workers(click.IntRange):
 )
 @click.option("--sampling", type=SamplingRule(), default="grid", show_default=True, help=SAMPLING)
 @click.option(
-    "--budget", type=click.IntRange(100, 10**7), default=400, show_default=True, help="Cycles at the most, by point."
+    "--budget", type=IntRange(100, 10**7), default=400, show_default=True, help="Cycles at the most, by point."
 )
 @click.option(
     "--label", "labels", multiple=True, metavar="KEY=VALUE", help=f"How points are labelled, repeatable: {LABEL}."

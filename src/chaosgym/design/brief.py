@@ -152,6 +152,11 @@ def _read(path: str | Path) -> tuple[str, dict[str, Any]]:
     try:
         text, values = toml_of(path)
     except ValueError as error:
+        if Path(path).suffix not in ("", FILE_ENDING) and Path(path).is_file():
+            raise DesignError(
+                f"{path} is no brief, which is a TOML file; a recording is judged by `chaosgym judge {path}`, and put "
+                f"beside a brief by --beside {path}"
+            ) from None
         raise DesignError(f"{path} {error}") from None
     return text, values
 

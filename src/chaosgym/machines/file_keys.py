@@ -2,6 +2,7 @@
 
 import math
 from collections.abc import Callable, Mapping
+from difflib import get_close_matches
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -93,6 +94,24 @@ class Keys(NamedTuple):
         """Names of the tables within a table."""
         return [name.rpartition(".")[2] for name in self.tables if name and name.rpartition(".")[0] == path]
 
+    def check_tables(self, values: Mapping[str, Any]) -> None:
+        """Refuse a file without a table that every file has.
+
+        Raises
+        ------
+        ParameterError
+            If one is missing; says which table of the file was probably meant for it.
+        """
+        tops = {*self.tables[""], *self._inner("")}
+        for name in self.required:
+            if name in values:
+                continue
+            table = f"[[{name}]]" if name in self.lists else f"[{name}]"
+            if near := get_close_matches(name, values.keys() - tops, n=1):
+                several = f", or [[{name}]] for each of several" if name in self.either else ""
+                raise ParameterError(f"the file has no table {near[0]!r}; did you mean {table}{several}?")
+            raise ParameterError(f"{table} is missing")
+
     def checked(self, path: str, given: Any, where: str | None = None) -> dict[str, Any]:
         """Values of a table in SI: floats, arrays, texts; tables within it are left out.
 
@@ -117,7 +136,10 @@ class Keys(NamedTuple):
             key = known.get(name) or known.get("*")
             if key is None:
                 table = f"[{where}]" if where else "the file"
-                raise ParameterError(f"{table} has no key {name!r}{self.unknown(name, [*known, *inner])}")
+                meant = self.unknown(name, [*known, *inner])
+                tables = [] if where else [f"[[{one}]]" if one in self.lists else f"[{one}]" for one in inner]
+                meant = next((f"; did you mean {one}?" for one in tables if f"mean {one.strip('[]')}?" in meant), meant)
+                raise ParameterError(f"{table} has no key {name!r}{meant}")
             values[name] = value if path in AS_GIVEN else self._value(f"{prefix}{name}", value, key)
         return values
 
@@ -202,6 +224,13 @@ def _parsed(name: str, given: Any, key: Key) -> Any:
     return given
 
 
+OR_ELSE = {
+    ("joint", "damping"): "; in place of damping, restitution would do",
+    ("joint", "hertz_damping"): "; in its place restitution and impact_speed would do",
+}
+"""By kind of table and key: what may stand in place of the key."""
+
+
 def needed(table: str, values: Mapping[str, Any], *names: str) -> list[Any]:
     """Values of keys that a table must have.
 
@@ -212,5 +241,7 @@ def needed(table: str, values: Mapping[str, Any], *names: str) -> list[Any]:
     """
     missing = [name for name in names if name not in values]
     if missing:
-        raise ParameterError(f"[{table}] lacks {' and '.join(missing)}")
+        kind = table.partition(" ")[0]
+        others = "".join(OR_ELSE[kind, name] for name in missing if (kind, name) in OR_ELSE)
+        raise ParameterError(f"[{table}] lacks {' and '.join(missing)}{others}")
     return [values[name] for name in names]

@@ -156,6 +156,11 @@ def suggestion(name: str, known: Iterable[str]) -> str:
     return "; " + nearest_or(f"known: {', '.join(names)}", name, names)
 
 
+def name_of(machine: Any) -> str:
+    """Name by which a person knows a machine: that of its file, or of its kind."""
+    return getattr(machine, "name", "") or type(machine).__name__
+
+
 def with_settings(machine: M, settings: Mapping[str, Any]) -> M:
     """Return the machine with some fields replaced, or with those of a rung of ``fidelity``.
 
@@ -172,7 +177,7 @@ def with_settings(machine: M, settings: Mapping[str, Any]) -> M:
     settings = by_field(machine, expand_fidelity(machine, settings))
     for name in settings:
         if name not in known:
-            raise ParameterError(f"{type(machine).__name__} has no field {name!r}{suggestion(name, known)}")
+            raise ParameterError(f"{name_of(machine)} has no field {name!r}{suggestion(name, known)}")
     made = replace(machine, **settings)  # type: ignore[type-var]
     if "_initial_state" in vars(machine):
         object.__setattr__(made, "_initial_state", vars(machine)["_initial_state"])

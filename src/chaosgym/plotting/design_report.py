@@ -183,7 +183,7 @@ def report_paths(out: str | Path, overwrite: bool = False) -> tuple[Path, Path]:
     """Paths of the HTML or PDF file and the JSON file, both free to be written."""
     page = Path(out)
     if page.suffix.lower() not in (".html", ".htm", PDF):
-        raise DesignError(f"out = {str(out)!r} is no report; allowed: a name that ends in .html or .pdf")
+        raise DesignError(f"{str(out)!r} is no name of a report; allowed: names that end in .html or .pdf")
     if page.suffix.lower() == PDF:
         printing_browser()
     paths = page, page.with_suffix(".json")

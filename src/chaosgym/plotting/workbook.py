@@ -25,7 +25,7 @@ def check_workbook(out: str | Path, overwrite: bool = False) -> Path:
     """
     path = Path(out)
     if path.suffix.lower() != ".xlsx":
-        raise DesignError(f"tables = {str(out)!r} is no workbook; allowed: a name that ends in .xlsx")
+        raise DesignError(f"{str(out)!r} is no name of a workbook; allowed: names that end in .xlsx")
     if path.exists() and not overwrite:
         raise DesignError(f"{path} exists; choose another name, or say --overwrite")
     if not path.parent.is_dir():

@@ -17,8 +17,10 @@ from chaosgym.recordings.quantities import (
     OTHERS,
     SAME_LETTERS,
     SPEEDS,
+    UNITS,
     UNKNOWN,
     VOLTS,
+    WORDS,
     as_unit,
     other_quantity,
     split_unit,
@@ -98,8 +100,13 @@ def force_names(recording: Recording) -> list[str]:
     usable = [name for name in recording.columns if name not in recording.problems or recording.problems[name]]
     named = [name for name in known if name in usable]
     plain = [name for name in usable if not _speaks_against(recording, name)]
-    others = [name for name in usable if recording.units.get(name, "") in OTHERS or _other(recording, name)]
+    others = [name for name in usable if _is_judged(recording.units.get(name, "")) or _other(recording, name)]
     return named or plain or others
+
+
+def _is_judged(unit: str) -> bool:
+    """Whether readings in a unit may be judged: in their own, or in one that a person states in place of no unit."""
+    return unit in OTHERS or bool(unit and unit not in UNITS)
 
 
 def _other(recording: Recording, name: str) -> str:
@@ -297,11 +304,10 @@ def _force(recording: Recording, name: str, unit: str | None, scale: str | None)
     own, other = recording.units.get(name, ""), _other(recording, name)
     values, written = recording.columns[name], as_unit(unit or "") or unit or own
     if written and written not in FORCES and written not in OTHERS and not scale:
-        told = "allowed" if unit else "state its unit: --read unit=N"
-        listed = ", ".join([*FORCES, *sorted(OTHERS)])
-        raise DiagnosisError(
-            f"{recording.source}: column {name!r} is in {written}, no unit that is known; {told}: {listed}"
-        )
+        allowed = [*FORCES, *sorted(OTHERS)]
+        cure = "" if unit else "state its unit, such as --read unit=N; "
+        cure += nearest_or(f"allowed: {', '.join(allowed)}", written, [*allowed, *WORDS])
+        raise DiagnosisError(f"{recording.source}: column {name!r} is in {written}, no unit that is known; {cure}")
     check_unit(recording.source, name, written, own, other)
     if is_counter(_finite(values)):
         raise DiagnosisError(f"{recording.source}: column {name!r} rises in equal steps and can't be a force")

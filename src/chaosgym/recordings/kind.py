@@ -12,7 +12,7 @@ import numpy as np
 
 from chaosgym.arrays import Array
 from chaosgym.errors import DiagnosisError
-from chaosgym.recordings.quantities import CLOCK, UNKNOWN
+from chaosgym.recordings.quantities import CLOCK, DIMENSIONS, SIZES, UNKNOWN
 from chaosgym.recordings.read import Recording
 from chaosgym.recordings.sampling import choose_time, typical_step
 from chaosgym.units import as_float
@@ -113,15 +113,24 @@ class RecordingOptions:
 
 
 def in_readings(size: float | None, unit: str) -> float | None:
-    """The stated size of an error, which must be in the unit of the readings.
+    """The stated size of an error in the unit of the readings.
 
     Raises
     ------
     DiagnosisError
-        If it is in another one.
+        If it is in a unit of another quantity.
+
+    Examples
+    --------
+    >>> from chaosgym.recordings.kind import InUnit, in_readings
+    >>> in_readings(InUnit(0.1, "g"), "m/s^2")
+    0.980665
     """
     stated = getattr(size, "unit", unit)
-    if stated != unit:
+    if size is not None and stated != unit:
+        quantity = DIMENSIONS.get(stated, "")
+        if quantity in SIZES and quantity == DIMENSIONS.get(unit):
+            return float(size) * SIZES[quantity][stated] / SIZES[quantity][unit]
         if unit == UNKNOWN:
             raise DiagnosisError(
                 f"the sensor's error is in {stated}, and the file does not state the unit of the readings; state it: "

@@ -5,6 +5,7 @@ tells of another quantity, such as an acceleration, is never taken for a force.
 """
 
 import re
+from collections.abc import Mapping
 
 from chaosgym.units import ALTERNATIVES, unit_as_listed
 
@@ -25,22 +26,26 @@ _NEVER_JUDGED = ("deg", "°", "°C", "°F", "degC", "degF", "K", "C", "%", "-")
 UNITS = frozenset({*FORCES, *TIMES, *RATES, *SPEEDS, *OTHERS, *_NEVER_JUDGED}) - {"FS"}
 """Units that a file may name."""
 
-_DIMENSIONS = {
+SIZES: Mapping[str, Mapping[str, float]] = {
     "force": FORCES,
     "time": TIMES,
-    "frequency": {*RATES, *SPEEDS},
-    "acceleration": {"g", "m/s²", "m/s2", "m/s^2"},
-    "velocity": {"m/s", "mm/s", "in/s"},
-    "displacement": {"m", "mm", "um", "µm", "in", "mil"},
-    "pressure": {"Pa", "kPa", "MPa", "bar", "psi"},
+    "acceleration": {"g": 9.80665, "m/s²": 1.0, "m/s2": 1.0, "m/s^2": 1.0},
+    "velocity": {"m/s": 1.0, "mm/s": 1e-3, "in/s": 25.4e-3},
+    "displacement": {**ALTERNATIVES["m"], "µm": 1e-6},
+    "pressure": {"Pa": 1.0, "kPa": 1e3, "MPa": 1e6, "bar": 1e5, "psi": 6894.757293168},
     "voltage": VOLTS,
-    "current": {"A", "mA"},
-    "moment": {"Nm", "N·m"},
-    "mass": {"kg", "gram"},
+    "current": {"A": 1.0, "mA": 1e-3},
+    "moment": {"Nm": 1.0, "N·m": 1.0},
+    "mass": {"kg": 1.0, "gram": 1e-3},
+}
+"""By quantity: its units, and the size of each."""
+
+_OTHER_DIMENSIONS = {
+    "frequency": {*RATES, *SPEEDS},
     "angle": {"deg", "°"},
     "temperature": {"°C", "°F", "degC", "degF", "K", "C"},
 }
-DIMENSIONS = {unit: dimension for dimension, units in _DIMENSIONS.items() for unit in units}
+DIMENSIONS = {unit: each for table in (SIZES, _OTHER_DIMENSIONS) for each, units in table.items() for unit in units}
 """What each unit measures."""
 
 UNKNOWN = "units"

@@ -104,8 +104,9 @@ def judged_sweep(
         recording = replace(recording, source=str(source), sha256=digest)
         force = force._replace(described=f"{force.described}; of {len(parts)} files")
     speeds, peaks = (np.concatenate([part[place] for part in parts]) for place in (3, 4))
+    error, sigma = in_readings(options.sensor_error, "N"), in_readings(options.sensor_sigma, "N")
     try:
-        types = sweep_types(speeds, peaks, sensor_error=options.sensor_error, sensor_sigma=options.sensor_sigma)
+        types = sweep_types(speeds, peaks, sensor_error=error, sensor_sigma=sigma)
     except DiagnosisError as error:
         raise DiagnosisError(f"{recording.source}: {error}") from error
     return JudgedSweep(recording, speed, force, speeds, peaks, types)

@@ -58,9 +58,7 @@ def tables_of(values: Mapping[str, Any], _folder: Path) -> dict[str, Any]:
     ParameterError
         If a table or a key is missing or unknown, or a unit or a value is wrong.
     """
-    for name in KEYS.required:
-        if name not in values:
-            raise ParameterError(f"[{name}] is missing" if name != "joint" else "[[joint]] is missing")
+    KEYS.check_tables(values)
     data: dict[str, Any] = {"": KEYS.checked("", values)}
     for path in ("ground", "motor", "operation", "tolerances", "job"):
         data[path] = KEYS.checked(path, values.get(path, {}))

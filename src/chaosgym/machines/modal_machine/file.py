@@ -42,9 +42,8 @@ def tables_of(values: Mapping[str, Any], folder: Path) -> dict[str, Any]:
     """
     data: dict[str, Any] = {}
     sampled: dict[str, list[Any]] = {name: _rows(values.get(name, []), name, folder) for name in SAMPLED}
-    for name in KEYS.required:
-        if name not in values:
-            raise ParameterError(f"[{name}] is missing")
+    KEYS.check_tables(values)
+    KEYS.checked("", values)
     if not {"drive", "load"} & set(values) and "initial_state" not in values["operation"]:
         raise ParameterError("[[drive]] is missing; allowed without one: a [[load]], or operation.initial_state")
     loads = values.get("load", [])
