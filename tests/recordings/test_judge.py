@@ -289,6 +289,8 @@ def test_impossible_readings_are_refused():
     for value in (1e308, np.nan, np.inf):
         with pytest.raises(DiagnosisError, match="no force in newton"):
             judge_peaks(np.full(20, value))
+        with pytest.raises(DiagnosisError, match="no reading in g; allowed: finite, up to"):
+            judge_peaks(np.full(20, value), unit="g")
 
 
 def test_readings_whose_squares_are_no_numbers_are_refused():

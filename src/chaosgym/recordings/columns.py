@@ -40,6 +40,9 @@ SPEED = re.compile(r"hz|freq\w*|frequenz|rpm|speed|drehzahl", re.IGNORECASE)
 FIRST, BLOCK = 1000, 2**20
 """Readings that tell of most columns that they are no clock, and those of a long column that are looked at in turn."""
 
+LARGEST = 1e100
+"""Size of a reading beyond which sums of squares are no numbers."""
+
 MOST_SHOWN = 12
 """Columns that a message names."""
 
@@ -309,6 +312,12 @@ def _force(recording: Recording, name: str, unit: str | None, scale: str | None)
         cure += nearest_or(f"allowed: {', '.join(allowed)}", written, [*allowed, *WORDS])
         raise DiagnosisError(f"{recording.source}: column {name!r} is in {written}, no unit that is known; {cure}")
     check_unit(recording.source, name, written, own, other)
+    if max(float(np.fmax.reduce(values, initial=0.0)), -float(np.fmin.reduce(values, initial=0.0))) > LARGEST:
+        place = int(np.argmax(np.abs(values) > LARGEST))
+        raise DiagnosisError(
+            f"{recording.source}, column {name!r}, {recording.where(place)}: {values[place]:g} is no reading of a "
+            f"sensor; allowed: up to {LARGEST:g}"
+        )
     if is_counter(_finite(values)):
         raise DiagnosisError(f"{recording.source}: column {name!r} rises in equal steps and can't be a force")
     told = written or (UNKNOWN if other else "N")

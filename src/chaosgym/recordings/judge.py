@@ -11,6 +11,7 @@ r"""The nature of a measured record: one answer from peaks and the sensor's erro
 import math
 import re
 from dataclasses import replace
+from functools import partial
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -105,9 +106,14 @@ def judge_peaks(
         ]
         return judge_together(alone, table, [f"sensor {place}" for place in range(1, len(alone) + 1)])
     if unit != "N":
-        verdict = judge_peaks(
-            peaks, sensor_error=sensor_error, sensor_sigma=sensor_sigma, resolution=resolution, sampled=sampled
-        )
+        try:
+            verdict = judge_peaks(
+                peaks, sensor_error=sensor_error, sensor_sigma=sensor_sigma, resolution=resolution, sampled=sampled
+            )
+        except DiagnosisError as error:
+            raise DiagnosisError(
+                _shown(str(error).replace("no force in newton", f"no reading in {unit}"), unit)
+            ) from None
         return _in_unit(verdict, unit)
     readings = _checked(peaks)
     told = stated_error(sensor_error, sensor_sigma)
@@ -176,12 +182,14 @@ def _of_sampling(verdict: MeasuredVerdict, line: Line) -> MeasuredVerdict:
     return replace(verdict, diagnosis=replace(periodic, condition=f"if {condition}" if condition else ""))
 
 
+def _shown(text: str, unit: str) -> str:
+    """A text with sizes in another unit than newton."""
+    return re.sub(r"(?<=\d) N\b", f" {unit}", text.replace("the force", "the reading"))
+
+
 def _in_unit(verdict: MeasuredVerdict, unit: str) -> MeasuredVerdict:
     """The verdict with its sizes in another unit than newton."""
-
-    def shown(text: str) -> str:
-        return re.sub(r"(?<=\d) N\b", f" {unit}", text.replace("the force", "the reading"))
-
+    shown = partial(_shown, unit=unit)
     found = verdict.diagnosis
     diagnosis = replace(found, reason=shown(found.reason), condition=shown(found.condition))
     seen = tuple(feature._replace(text=shown(feature.text)) for feature in verdict.description)
