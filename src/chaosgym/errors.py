@@ -63,6 +63,10 @@ class DiagnosisError(ChaosgymError, ValueError):
     """A response can't be judged: too few cycles, values that are not finite, or a wrong shape."""
 
 
+class NoRecordingError(DiagnosisError):
+    """A file is no recording: it holds no numbers, or is of no form that is known."""
+
+
 class DatasetError(ChaosgymError, ValueError):
     """A dataset folder or file is missing, damaged, or belongs to another run."""
 

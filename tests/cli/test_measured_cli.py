@@ -176,7 +176,22 @@ def test_extreme_peaks_end_in_one_line_or_a_plain_answer(value):
     for command in COMMANDS:
         code, out, err = run(*command, "-", stdin=f"{value}\n" * 60)
         assert (code == 2 and len(err.strip().splitlines()) == 1) or "no contact" in out
-        assert value == "0" or "is no force in newton" in err or "allowed: 0, or 1e-100 N and more" in err
+        assert value == "0" or "1e+308 is no reading of a sensor" in err or "0, or 1e-100 N and more" in err
+
+
+@pytest.mark.parametrize("title", ["acc [g]", "force [N]"])
+@pytest.mark.parametrize("kind", ["peaks", "series"])
+def test_readings_that_no_computer_can_square_end_in_one_line(title, kind):
+    """One of 1e308 among many, as a recorder's mark, and one of -1e308: nothing overflows, and the line is named."""
+    readings = np.sin(0.3 * np.arange(400))
+    readings[[100, 200]] = 1e308, -1e308
+    table = f"{title}\n" + "".join(f"{value:.6g}\n" for value in readings)
+    code, out, err = run("judge", "-", "--as", kind, *(("--rate-hz", "1000") if kind == "series" else ()), stdin=table)
+    assert (code, out) == (2, "")
+    name = title.split()[0]
+    assert err.strip() == (
+        f"Error: standard input, column '{name}', line 102: 1e+308 is no reading of a sensor; allowed: up to 1e+100"
+    )
 
 
 def test_units_are_understood_by_options_fields_and_axes(tmp_path):
@@ -446,16 +461,22 @@ def test_columns_are_named_by_patterns_lists_and_numbers(recordings):
 
 
 def test_a_folder_or_a_pattern_gives_a_table(recordings):
-    """A line for every channel of every file, in its own unit; a file that can't be judged says why."""
+    """A line for every channel of every file, in its own unit; what is no recording is named once, and counted."""
+    (recordings / "empty.csv").write_text("")
     picture = recordings.parent / "page.png"
     code, out, _ = run("judge", recordings, "--plot", picture)
     assert code == 0
     assert picture.stat().st_size > 10_000
     rows = out.splitlines()
     assert rows[0].split() == ["file", "channel", "verdict", "scatter", "cycles"]
-    channels = [("a.csv", "front"), ("a.csv", "rear"), ("a.csv", "together"), ("b.csv", "acc"), ("notes.txt", "not")]
-    assert [tuple(row.split()[:2]) for row in rows[1:6]] == channels
-    assert "notes.txt holds no numbers" in out
+    channels = [("a.csv", "front"), ("a.csv", "rear"), ("a.csv", "together"), ("b.csv", "acc")]
+    assert [tuple(row.split()[:2]) for row in rows[1:5]] == channels
+    assert "  2 of 4 files are no recordings: empty.csv, notes.txt" in rows
+    assert out.count("notes.txt") == 1
+    (recordings / "short.csv").write_text("force [N]\n1\n2\n")
+    out = run("judge", recordings)[1]
+    assert out.count("short.csv") == 1
+    assert "short.csv: the record has 2 cycles" in out
     code, out, _ = run("judge", recordings / "[ab].csv", "--json")
     told = json.loads(out)
     assert (code, told["not_judged"]) == (0, [])

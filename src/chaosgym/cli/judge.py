@@ -219,7 +219,10 @@ COLUMNS = ("file", "channel", "verdict", "scatter", "cycles")
 
 
 def table_lines(files: "Iterable[JudgedFile]") -> list[str]:
-    """A line for each run, then the reasons of what sensors say together."""
+    """A line for each run, then the reasons of what sensors say together, and of what was not judged."""
+    from chaosgym.recordings.runs import not_judged
+
+    files = list(files)
     rows: list[tuple[str, ...]] = [COLUMNS]
     reasons = []
     for one in files:
@@ -228,12 +231,9 @@ def table_lines(files: "Iterable[JudgedFile]") -> list[str]:
         if one.together is not None:
             rows.append(_row(name, "together", one.together, len(one.runs[0].peaks)))
             reasons.append(f"{name}: {one.together.diagnosis.reason}")
-        if one.error:
-            rows.append((name, "", "not judged", "", ""))
-            reasons.append(one.error)
     widths = [max(len(row[place]) for row in rows) for place in range(len(COLUMNS))]
     lines = ["  ".join(text.ljust(width) for text, width in zip(row, widths, strict=True)).rstrip() for row in rows]
-    return [*lines, *(f"  {reason}" for reason in reasons)]
+    return [*lines, *(f"  {reason}" for reason in [*reasons, *not_judged(files)])]
 
 
 def _row(name: str, channel: str, verdict: "MeasuredVerdict", cycles: int) -> tuple[str, ...]:

@@ -15,7 +15,7 @@ from chaosgym.plotting import design as figures
 from chaosgym.plotting import response
 from chaosgym.plotting.design_report import CONVERGENCE, Picture, drawn_by, picture_of, rendered
 from chaosgym.plotting.style import ACCENT, MUTED, NATURE_COLOURS, STYLE, figure_of
-from chaosgym.recordings.runs import JudgedFile, Run
+from chaosgym.recordings.runs import JudgedFile, Run, no_recordings
 from chaosgym.recordings.trace import Trace
 
 MOST_DRAWN = 12
@@ -65,6 +65,7 @@ def recording_report(files: Sequence[JudgedFile], life: MeasuredPeaks | None = N
         "recording.html",
         "",
         files=files,
+        others=no_recordings(files),
         sections=[_section(run, place < MOST_DRAWN) for place, run in enumerate(runs)],
         left_out=max(0, len(runs) - MOST_DRAWN),
         colours=NATURE_COLOURS,

@@ -12,7 +12,7 @@ from typing import Any, NamedTuple
 import pyarrow as pa
 import pyarrow.csv
 
-from chaosgym.errors import DiagnosisError
+from chaosgym.errors import DiagnosisError, NoRecordingError
 from chaosgym.recordings.lines import FIRST, Line, decimal_comma, is_entry, is_missing, is_number
 from chaosgym.recordings.naming import DECIMAL, RATE, STEP
 from chaosgym.recordings.quantities import as_unit, split_unit
@@ -193,7 +193,7 @@ def layout_of(written: list[Line], kept: list[Line], last: list[str], delimiter:
 
     start = next((place for place, (_, line) in enumerate(kept[:HEADING]) if begins(line)), None)
     if start is None:
-        raise DiagnosisError("holds no numbers")
+        raise NoRecordingError("holds no numbers")
     above = frozenset(line for _, line in kept[:start])
     body = [(number, line) for number, line in kept[start : start + 2 * FIRST] if line not in above][:FIRST]
     over = [(number, line) for number, line in written if number < body[0][0]]

@@ -18,7 +18,7 @@ from pathlib import Path
 import numpy as np
 
 from chaosgym.arrays import Array
-from chaosgym.errors import DiagnosisError
+from chaosgym.errors import DiagnosisError, NoRecordingError
 from chaosgym.recordings.formats import format_of
 from chaosgym.recordings.naming import Named, named
 from chaosgym.recordings.quantities import split_unit
@@ -118,13 +118,13 @@ def read_recording(source: str | Path, *, sheet: str | None = None, column: str 
             raise DiagnosisError(f"is read as {form.name}, which has no sheets; got: sheet {sheet!r}")
         raw, one = (raw, named(raw)) if isinstance(raw, Raw) else _part(raw, form.name, sheet, column)
     except DiagnosisError as error:
-        raise DiagnosisError(f"{name} {error}") from error
+        raise type(error)(f"{name} {error}") from error
     except Exception as error:  # whatever a library says of damaged bytes
         raise DiagnosisError(
             f"{name} can't be read as {form.name}: {(str(error).splitlines() or ['damaged'])[0][:120]}"
         ) from error
     if not one.columns and not one.problems:
-        raise DiagnosisError(f"{name} holds no numbers")
+        raise NoRecordingError(f"{name} holds no numbers")
     told = f", of another length and left out: {', '.join(one.left[:5])}" if one.left else ""
     return Recording(
         source=name,
@@ -176,7 +176,7 @@ def _part(parts: Parts, form: str, sheet: str | None, column: str | None) -> tup
             return raw, one
         tables.append((min(rows, FEWEST_ROWS), raw, one))
     if not tables:
-        raise DiagnosisError("holds no numbers")
+        raise NoRecordingError("holds no numbers")
     return max(tables, key=lambda table: table[0])[1:]
 
 

@@ -3,7 +3,7 @@
 ``judged_runs`` reads one file, ``judged_files`` a file, a folder or a pattern.
 """
 
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass, replace
 from functools import partial
 from glob import glob, has_magic
@@ -13,9 +13,9 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from chaosgym.arrays import Array
-from chaosgym.errors import ChaosgymError, DiagnosisError
+from chaosgym.errors import ChaosgymError, DiagnosisError, NoRecordingError
 from chaosgym.numbers import summary
-from chaosgym.recordings.columns import Signal, check_peaks, choose_force, forces, named_columns
+from chaosgym.recordings.columns import MOST_SHOWN, Signal, check_peaks, choose_force, forces, named_columns
 from chaosgym.recordings.description import Sampled
 from chaosgym.recordings.judge import judge_peaks
 from chaosgym.recordings.kind import Kind, RecordingOptions, in_readings, kind_of
@@ -86,12 +86,16 @@ class Run:
 
 @dataclass(frozen=True)
 class JudgedFile:
-    """The runs of one file with what they show together, or why it was not judged, or some of its columns were not."""
+    """The runs of one file with what they show together, or why it was not judged, or some of its columns were not.
+
+    ``recording`` is whether it is one, as far as it was read.
+    """
 
     source: str
     runs: tuple[Run, ...] = ()
     together: MeasuredVerdict | None = None
     error: str = ""
+    recording: bool = True
 
 
 def judged_runs(
@@ -205,9 +209,10 @@ def judged_files(
         try:
             judged.append(_judged_file(name, options or RecordingOptions(), traced))
         except (ChaosgymError, OSError) as error:
-            judged.append(JudgedFile(name, error=str(error)))
+            judged.append(JudgedFile(name, error=str(error), recording=not isinstance(error, NoRecordingError)))
     if not any(one.runs for one in judged):
-        raise DiagnosisError(f"no file of {source} could be judged; the first: {judged[0].error}")
+        first = next((one for one in judged if one.recording), judged[0])
+        raise DiagnosisError(f"no file of {source} could be judged; the first: {first.error}")
     return tuple(judged)
 
 
@@ -218,8 +223,37 @@ def table_as_dict(files: Iterable[JudgedFile]) -> dict[str, Any]:
         "recordings": [run.as_dict() for one in files for run in one.runs],
         "together": [{"file": one.source, **one.together.as_dict()} for one in files if one.together is not None],
         "not_judged": [{"file": one.source, "reason": one.error} for one in files if one.error],
-        "warnings": [one.error for one in files if one.error],
+        "warnings": not_judged(files),
     }
+
+
+def not_judged(files: Iterable[JudgedFile]) -> list[str]:
+    """Why files, or columns, were not judged, a line each; one line for all that are no recordings.
+
+    Examples
+    --------
+    >>> from chaosgym.recordings.runs import JudgedFile, not_judged
+    >>> not_judged([JudgedFile("runs/notes.txt", error="runs/notes.txt holds no numbers", recording=False)])
+    ['1 of 1 files is no recording: notes.txt']
+    """
+    files = list(files)
+    told = no_recordings(files)
+    return [*(f"not judged: {one.error}" for one in files if one.error and one.recording), *([told] if told else [])]
+
+
+def no_recordings(files: Sequence[JudgedFile]) -> str:
+    """How many files are no recordings, and which; empty if all are.
+
+    Examples
+    --------
+    >>> from chaosgym.recordings.runs import JudgedFile, no_recordings
+    >>> no_recordings([JudgedFile("a.csv"), JudgedFile("runs/notes.txt", recording=False)])
+    '1 of 2 files is no recording: notes.txt'
+    """
+    others = [Path(one.source).name for one in files if not one.recording]
+    are = "are no recordings" if len(others) > 1 else "is no recording"
+    more = f" and {len(others) - MOST_SHOWN} more" if len(others) > MOST_SHOWN else ""
+    return f"{len(others)} of {len(files)} files {are}: {', '.join(others[:MOST_SHOWN])}{more}" if others else ""
 
 
 def ask_for_force(source: str, signal: Signal) -> None:

@@ -12,7 +12,7 @@ from typing import Any
 
 import numpy as np
 
-from chaosgym.errors import DiagnosisError
+from chaosgym.errors import DiagnosisError, NoRecordingError
 from chaosgym.recordings.heading import COMMENT, QUOTED, TORN, Layout, delimiter_of, layout_of, table_of
 from chaosgym.recordings.lines import (
     BLOCK,
@@ -59,7 +59,7 @@ def read_text(data: Data) -> Raw:
     check_readings(_entries_of(data))
     encoding, rows = encoding_of(data), _lines_of(data)
     if b"\0" in data[:LONGEST] and not encoding.startswith("utf-16"):
-        raise DiagnosisError("is neither text nor a format that is known (CSV, Parquet, .npy, .mat, WAV, UFF)")
+        raise NoRecordingError("is neither text nor a format that is known (CSV, Parquet, .npy, .mat, WAV, UFF)")
     blocks, tail = blocks_of(data, encoding), last_lines(data, encoding)
     if rows <= 2 * TAIL:
         if len(data) > MOST_TURNED:
@@ -109,10 +109,10 @@ def _read(blocks: Iterator[list[Line]], tail: list[str], rows: int) -> Raw:
     """Columns of the lines of a table, of which the last are known."""
     written = next(blocks)
     if any("\0" in line for _, line in written):
-        raise DiagnosisError("is neither text nor a format that is known (CSV, Parquet, .npy, .mat, WAV, UFF)")
+        raise NoRecordingError("is neither text nor a format that is known (CSV, Parquet, .npy, .mat, WAV, UFF)")
     kept, last = _of_data(written), [line for _, line in _of_data(enumerate(tail, start=1))][-TAIL:]
     if not kept or not last:
-        raise DiagnosisError("holds no numbers")
+        raise NoRecordingError("holds no numbers")
     delimiter = delimiter_of(kept[0][1], last)
     prepare = _Prepared(delimiter)
     layout, start = layout_of(written, prepare(kept), [line for _, line in prepare(list(enumerate(last)))], delimiter)
