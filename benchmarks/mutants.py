@@ -1,10 +1,12 @@
-"""Do the tests notice a mistake, anywhere but in kernels? A sample of changes, each tried with the tests of its wing.
+"""Do the tests notice a mistake, anywhere but in kernels? A sample of changes, each tried with the tests that reach it.
 
 Changes are mutmut's: of operators, constants, arguments and texts in functions. A wing is a folder of the library; its
-share of the sample is that of its lines, and a module is drawn by its lines. Rows are written as they are made, so a
-run that was stopped goes on. A wing whose tests do not pass unchanged is left out, and named.
+share of the sample is that of its lines, and a module is drawn by its lines. The tests of a wing run once unchanged,
+and tell which lines each reaches. Rows are written as they are made, so a run that was stopped goes on. A wing whose
+tests do not pass unchanged is left out, and named.
 """
 
+import ast
 import json
 import math
 import os
@@ -25,11 +27,17 @@ LIBRARY = ROOT / "src" / "chaosgym"
 WITHOUT = ("core", "envs/kernels")
 """Kernels, whose changes are compiled anew: they are held by golden results."""
 
-SHARED = ("tests/test_thresholds.py", "tests/test_arguments.py")
+SHARED = ("tests/test_thresholds.py", "tests/test_arguments.py", "tests/test_examples.py")
 """Tests that belong to several wings."""
 
 ALONE = ("tests/test_files.py", "tests/machines/test_numbers.py", "tests/test_fuzz.py")
 """Tests of the modules that are in no folder."""
+
+MORE = {
+    "recordings": ("tests/series", *(f"tests/cli/test_{name}_cli.py" for name in ("measured", "run_up", "monitor"))),
+    "series": ("tests/recordings",),
+}
+"""Tests of a wing that are not in its folder."""
 
 PATIENCE = 900.0
 """Time [s] after which a change that makes tests hang counts as noticed."""
@@ -105,31 +113,70 @@ def changes(path: Path) -> list[Any]:
     return [maker(one) for one in mutations if one.contained_by_top_level_function is not None]
 
 
-def chosen_tests(wing: str, path: str) -> list[str]:
-    """Test files of a wing, the module's own first."""
-    folder = ROOT / "tests" / wing
-    files = (
-        [*ALONE] if wing == "top" else [one.relative_to(ROOT).as_posix() for one in sorted(folder.rglob("test_*.py"))]
-    )
-    own = f"test_{Path(path).stem}.py"
-    return sorted([*files, *SHARED], key=lambda name: not name.endswith(own))
+def chosen_tests(wing: str) -> list[str]:
+    """Test files of a wing."""
+    own = sorted((ROOT / "tests" / wing).rglob("test_*.py"))
+    files = [*ALONE] if wing == "top" else [one.relative_to(ROOT).as_posix() for one in own]
+    return [*files, *SHARED, *MORE.get(wing, ())]
 
 
-def passes(source: Path, tests: list[str]) -> bool:
-    """Whether tests pass with the library of a folder."""
-    command = [sys.executable, "-m", "pytest", "-q", "-x", "-p", "no:cacheprovider", *tests]
-    where = os.environ | {"PYTHONPATH": str(source), "PYTHONDONTWRITEBYTECODE": "1"}
+def pytest(source: Path, *words: str, seconds: float | None = None, **environment: str) -> bool:
+    """Whether a run of pytest with the library of a folder passes within a time."""
+    command = [sys.executable, "-m", "pytest", "-q", "-x", "-p", "no:cacheprovider", *words]
+    where = os.environ | {"PYTHONPATH": str(source), "PYTHONDONTWRITEBYTECODE": "1"} | environment
     try:
-        done = subprocess.run(command, cwd=ROOT, env=where, capture_output=True, timeout=PATIENCE, check=False)
+        done = subprocess.run(command, cwd=ROOT, env=where, capture_output=True, timeout=seconds, check=False)
     except subprocess.TimeoutExpired:
         return False
     return done.returncode == 0
 
 
+def who_reaches(source: Path, wing: str) -> dict[str, dict[int, list[str]]] | None:
+    """Tests of a wing by module and line that they reach in their own process; None if they do not pass."""
+    from coverage import CoverageData
+
+    library = source / "chaosgym"
+    data = source.parent / f"{wing}.coverage"
+    words = [f"--cov={library}", "--cov-context=test", "--cov-report=", *chosen_tests(wing)]
+    if not pytest(source, *words, COVERAGE_FILE=str(data)):
+        return None
+    reached = CoverageData(str(data))
+    reached.read()
+    return {Path(path).relative_to(library).as_posix(): _by_line(reached, path) for path in reached.measured_files()}
+
+
+def _by_line(reached: Any, path: str) -> dict[int, list[str]]:
+    """Tests by line of a module; a line that runs at its import alone is reached by all tests of the module."""
+    contexts = reached.contexts_by_lineno(path)
+    named = {line: sorted({test.split("|")[0] for test in tests if test}) for line, tests in contexts.items()}
+    every = sorted({test for tests in named.values() for test in tests})
+    return {line: tests or every for line, tests in named.items()}
+
+
+def lines_of_statement(code: str, line: int) -> range:
+    """Lines of the innermost statement that holds a line; of one with a body its head alone."""
+    held = []
+    for node in ast.walk(ast.parse(code)):
+        if isinstance(node, ast.stmt) and node.lineno <= line <= (node.end_lineno or 0):
+            body = getattr(node, "body", None)
+            last = body[0].lineno - 1 if body and body[0].lineno > line else node.end_lineno or line
+            held.append(range(node.lineno, max(last, node.lineno) + 1))
+    return min(held, key=len)
+
+
+def notices(source: Path, tests: list[str]) -> bool:
+    """Whether one of some tests fails with the library of a folder, or hangs."""
+    if not tests:
+        return False
+    names = source.parent / "tests.txt"
+    names.write_text("\n".join(tests))
+    return not pytest(source, f"@{names}", seconds=PATIENCE)
+
+
 def run(file: Path, count: int, seed: int, wanted: tuple[str, ...] = (), *, most: int | None = None) -> None:
     """Try the changes of a sample that a file of rows has not yet, and add a row for each."""
     rows = [json.loads(line) for line in file.read_text().splitlines()] if file.exists() else []
-    tried, sound = {row["number"] for row in rows}, dict[str, bool]()
+    tried, reached = {row["number"] for row in rows}, dict[str, Any]()
     with tempfile.TemporaryDirectory() as folder, file.open("a") as out:
         source = Path(folder) / "src"
         shutil.copytree(LIBRARY, source / "chaosgym", ignore=shutil.ignore_patterns("__pycache__"))
@@ -138,15 +185,17 @@ def run(file: Path, count: int, seed: int, wanted: tuple[str, ...] = (), *, most
                 continue
             if most is not None and len(tried) - len(rows) >= most:
                 return
-            tests = chosen_tests(change.wing, change.path)
-            if change.wing not in sound:
-                sound[change.wing] = passes(source, tests)
-            target = source / "chaosgym" / change.path
+            if change.wing not in reached:
+                reached[change.wing] = who_reaches(source, change.wing)
+            target, original = source / "chaosgym" / change.path, LIBRARY / change.path
             outcome = "not tried: the tests of the wing do not pass"
-            if sound[change.wing]:
+            if (by_module := reached[change.wing]) is not None:
+                by_line = by_module.get(change.path, {})
+                lines = lines_of_statement(original.read_text(), change.line)
+                tests = sorted({test for line in lines for test in by_line.get(line, ())})
                 target.write_text(change.code)
-                outcome = "survives" if passes(source, tests) else "noticed"
-                shutil.copyfile(LIBRARY / change.path, target)
+                outcome = "noticed" if notices(source, tests) else "survives"
+                shutil.copyfile(original, target)
             row = {name: value for name, value in change._asdict().items() if name != "code"}
             print(json.dumps(row | {"outcome": outcome}), file=out, flush=True)
             tried.add(change.number)

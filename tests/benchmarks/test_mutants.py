@@ -9,7 +9,19 @@ import pytest
 pytest.importorskip("mutmut")
 
 from benchmarks import mutants
-from benchmarks.mutants import LIBRARY, Change, chosen_tests, interval, sample, score, shares, wings
+from benchmarks.mutants import (
+    LIBRARY,
+    Change,
+    chosen_tests,
+    interval,
+    lines_of_statement,
+    notices,
+    sample,
+    score,
+    shares,
+    who_reaches,
+    wings,
+)
 
 
 def test_shares_are_whole_and_add_up():
@@ -25,7 +37,7 @@ def test_the_sample_covers_every_wing_but_kernels():
     paths = {path.relative_to(LIBRARY).as_posix() for paths in modules.values() for path in paths}
     assert "numbers.py" in paths
     assert not [path for path in paths if path.startswith(("core/", "envs/kernels/"))]
-    assert all(chosen_tests(wing, "x.py") for wing in modules)
+    assert all(chosen_tests(wing) for wing in modules)
 
 
 def test_a_change_is_one_place_of_a_module_and_the_same_each_time():
@@ -40,15 +52,8 @@ def test_a_change_is_one_place_of_a_module_and_the_same_each_time():
 
 
 def test_a_run_that_was_stopped_goes_on(tmp_path, monkeypatch):
-    """Rows that are there are not tried again; a wing whose tests do not pass has no outcome."""
-    tried = []
-
-    def passes(source, tests):
-        tried.append(tests)
-        return "machines" not in tests[-1]
-
-    monkeypatch.setattr(mutants, "passes", passes)
-    monkeypatch.setattr(mutants, "chosen_tests", lambda wing, path: [path, wing])
+    """Rows that are there are not tried again; a wing whose tests do not pass has no outcome; no test, no notice."""
+    monkeypatch.setattr(mutants, "who_reaches", lambda source, wing: None if wing == "machines" else {})
     file = tmp_path / "rows.jsonl"
     mutants.run(file, 30, 0, most=3)
     mutants.run(file, 30, 0, most=4)
@@ -58,6 +63,39 @@ def test_a_run_that_was_stopped_goes_on(tmp_path, monkeypatch):
         "not tried: the tests of the wing do not pass"
     }
     assert {row["outcome"] for row in rows if row["wing"] != "machines"} == {"survives"}
+
+
+CODE = """def f(x):
+    if x > 1:
+        return g(
+            x,
+        )
+    return x
+"""
+
+
+def test_a_change_is_tried_by_the_tests_that_reach_its_statement(tmp_path):
+    """A statement of three lines is one; of one with a body, its head."""
+    held = {line: [*lines_of_statement(CODE, line)] for line in range(1, 7)}
+    assert held == {1: [1], 2: [2], 3: [3, 4, 5], 4: [3, 4, 5], 5: [3, 4, 5], 6: [6]}
+
+
+def test_who_reaches_a_line_notices_its_change(tmp_path, monkeypatch):
+    """Of two tests one calls the function; it alone is run, and fails when the function is changed."""
+    module, test = tmp_path / "src" / "chaosgym" / "half.py", tmp_path / "test_half.py"
+    module.parent.mkdir(parents=True)
+    module.write_text("def half(x):\n    return x / 2\n")
+    load = f"import runpy\nhalf = runpy.run_path({str(module)!r})['half']\n"
+    test.write_text(load + "def test_two():\n    assert half(2) == 1\ndef test_none():\n    pass\n")
+    monkeypatch.setattr(mutants, "ROOT", tmp_path)
+    monkeypatch.setattr(mutants, "chosen_tests", lambda wing: [str(test)])
+    source = tmp_path / "src"
+    reached = who_reaches(source, "any")
+    assert reached is not None
+    assert reached["half.py"][2] == ["test_half.py::test_two"]
+    assert not notices(source, reached["half.py"][2])
+    module.write_text("def half(x):\n    return x * 2\n")
+    assert notices(source, reached["half.py"][2])
 
 
 def test_the_score_has_its_interval_and_its_denominator(tmp_path):

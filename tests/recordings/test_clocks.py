@@ -7,6 +7,7 @@ import pytest
 from scipy.io import savemat
 
 from chaosgym.errors import DiagnosisError
+from chaosgym.recordings.columns import is_clock
 from chaosgym.recordings.cycles import peaks_of_series, series_of
 from chaosgym.recordings.read import read_recording
 from chaosgym.recordings.sampling import sampling
@@ -146,3 +147,12 @@ def test_channels_of_their_own_rate_keep_it(tmp_path):
 def test_durations_have_no_exponent(seconds, shown):
     """From microseconds to hours."""
     assert duration(seconds) == shown
+
+
+def test_stamps_may_be_uneven_and_a_gap_of_hours_is_no_tick():
+    """A clock never falls; stamps of a busy logger are a few ticks apart, and no gap is most of the time."""
+    uneven = np.cumsum(np.random.default_rng(0).uniform(0.5, 1.5, 100))
+    assert is_clock(uneven)
+    assert not is_clock(uneven[:7]), "a few rising readings are no clock"
+    assert not is_clock(np.append(uneven, uneven[-1] + 60.0))
+    assert not is_clock(np.append(uneven, 0.0))

@@ -280,3 +280,19 @@ def test_a_text_of_very_many_columns_is_refused_at_once(tmp_path):
     path.write_text("\n".join(",".join(str(place % 7 + row) for place in range(5000)) for row in range(3)))
     with pytest.raises(DiagnosisError, match="has 5000 columns; allowed: 4096"):
         read_recording(path)
+
+
+def test_standard_input_is_read_as_bytes(monkeypatch):
+    """A file of another encoding reads the same behind a pipe as by its name."""
+    content = "Kräfte [N]\n48.25\n49.5\n47.75\n48\n50.25\n".encode("latin-1")
+    monkeypatch.setattr(sys, "stdin", io.TextIOWrapper(io.BytesIO(content), encoding="utf-8"))
+    np.testing.assert_array_equal(choose_force(read_recording("-")).values, FORCES)
+
+
+def test_of_a_recorder_that_began_anew_the_longest_block_is_read(tmp_path):
+    """Readings, and notes beside them, of 20 rows and then 30 below another heading."""
+    blocks = [[f"{row},{20.0 + 7 * row % 11},ok\n" for row in range(size)] for size in (20, 30)]
+    (tmp_path / "record.csv").write_text("cycle,force [N],note\n".join(["", *map("".join, blocks)]))
+    recording = read_recording(tmp_path / "record.csv")
+    np.testing.assert_array_equal(choose_force(recording).values, 20.0 + 7 * np.arange(30) % 11)
+    assert "2 blocks of 20, 30 rows" in recording.form

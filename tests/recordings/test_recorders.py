@@ -3,6 +3,7 @@
 import contextlib
 import gc
 import io
+import struct
 import sys
 
 import numpy as np
@@ -94,6 +95,36 @@ def test_formats_give_force_and_rate(write, tmp_path):
     recording = read_recording(path)
     np.testing.assert_allclose(choose_force(recording).values, FORCE, rtol=1e-11)
     assert sampling(recording, 60).step == pytest.approx(1.0 / RATE)
+
+
+def test_stamps_of_a_measurement_file_are_read_once(tmp_path):
+    """A channel named t that holds the time again is no reading, and the rate is that of the file."""
+    asammdf = pytest.importorskip("asammdf")
+    path = tmp_path / "record.mf4"
+    file = asammdf.MDF()
+    signals = [asammdf.Signal(FORCE, TIME, name="Force", unit="N"), asammdf.Signal(TIME, TIME, name="t", unit="s")]
+    file.append(signals)
+    file.save(path)
+    file.close()
+    recording = read_recording(path)
+    assert list(recording.columns) == ["Force", "time"]
+    assert sampling(recording, 60).step == pytest.approx(1.0 / RATE)
+
+
+def element(kind, data):
+    """An element of MATLAB's version 5 with the most significant byte first, filled to eight bytes."""
+    return struct.pack(">II", kind, len(data)) + data + bytes(-len(data) % 8)
+
+
+def test_matlab_of_a_computer_with_the_most_significant_byte_first(tmp_path):
+    """Its header ends in MI; written by hand, as MathWorks' description of level 5 has it."""
+    head = b"MATLAB 5.0 MAT-file".ljust(124) + struct.pack(">H", 0x0100) + b"MI"
+    double, words, signed, letters, matrix = 9, 6, 5, 1, 14
+    flags = element(words, struct.pack(">II", 6, 0))  # class 6: double
+    force = flags + element(signed, struct.pack(">ii", 1, 60)) + element(letters, b"force")
+    content = element(matrix, force + element(double, FORCE.astype(">f8").tobytes()))
+    (tmp_path / "record.mat").write_bytes(head + content)
+    np.testing.assert_array_equal(choose_force(read_recording(tmp_path / "record.mat")).values, FORCE)
 
 
 @pytest.mark.parametrize("kind", ["PCM_U8", "PCM_16", "PCM_24", "PCM_32", "flac"])
