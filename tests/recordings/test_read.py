@@ -296,3 +296,17 @@ def test_of_a_recorder_that_began_anew_the_longest_block_is_read(tmp_path):
     recording = read_recording(tmp_path / "record.csv")
     np.testing.assert_array_equal(choose_force(recording).values, 20.0 + 7 * np.arange(30) % 11)
     assert "2 blocks of 20, 30 rows" in recording.form
+
+
+def test_readings_in_long_rows_are_turned(tmp_path):
+    """A row of a name and a thousand forces, alone or below one of instants; the form says so."""
+    force = 20.0 + np.arange(1000) * 7 % 11
+    rows = {
+        name: ",".join([name, *map(str, values)])
+        for name, values in (("time [s]", 0.001 * np.arange(1000)), ("force [N]", force))
+    }
+    for name, written in (("one long row", [rows["force [N]"]]), ("2 long rows", list(rows.values()))):
+        (tmp_path / "record.csv").write_text("\n".join(written) + "\n")
+        recording = read_recording(tmp_path / "record.csv")
+        np.testing.assert_array_equal(recording.columns["force"], force)
+        assert name in recording.form

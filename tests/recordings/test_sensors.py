@@ -115,6 +115,21 @@ def test_surrogates_of_two_sensors_keep_their_cross_spectrum():
     assert not np.array_equal(made, series)
 
 
+def test_surrogates_do_not_depend_on_the_unit():
+    """In another unit, a power of two so that no rounding differs, a record has the same surrogates."""
+    series = np.random.default_rng(6).normal(size=(300, 2))
+    plain, small = (surrogate(scale * series, np.random.default_rng(7)) for scale in (1.0, 2.0**-30))
+    np.testing.assert_array_equal(2.0**30 * small, plain)
+
+
+def test_the_sensor_that_shows_chaos_is_named():
+    """Of two readings of one chaotic map the first decides, and the reason says so."""
+    chaotic = 100.0 + 10.0 * logistic(3.9, 500)
+    verdict = judge_peaks(np.column_stack([chaotic, 2.0 * chaotic]), sensor_error=1e-3)
+    assert verdict.diagnosis.nature == "chaotic"
+    assert verdict.diagnosis.reason.startswith("sensor 1: ")
+
+
 def test_both_coordinates_of_the_henon_map_have_its_exponent():
     """0.419 a cycle (Sprott 2003) from the pair x, and x times y, over a cycle of two readings."""
     points = henon(1000)

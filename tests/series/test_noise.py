@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from scipy.spatial import KDTree
 
-from chaosgym.series.noise import predictability
+from chaosgym.series.noise import predictability, quantum
 from tests.series.maps import logistic
 
 
@@ -33,3 +33,12 @@ def test_a_map_predicts_itself_and_a_random_error_does_not():
     chaos, random = logistic(3.99, 400), np.random.default_rng(2).normal(size=400)
     assert predictability(chaos, chaos - chaos.mean()) > 15.0
     assert abs(predictability(random, random)) < 4.0
+
+
+def test_the_step_of_a_converter_is_that_of_readings_which_came_again():
+    """Half a newton came twice among whole ones: the step is half a newton; a reading that came once is none."""
+    whole = np.repeat(np.arange(4.0), 10)
+    assert quantum(whole) == 1.0
+    assert quantum(np.append(whole, [0.5, 0.5])) == 0.5
+    assert quantum(np.append(whole, 0.3)) == 1.0
+    assert quantum(np.random.default_rng(0).normal(size=50)) == 0.0
