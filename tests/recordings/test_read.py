@@ -142,6 +142,7 @@ def test_a_column_is_taken_by_name_number_and_unit(tmp_path):
         ("Channel A [mV]", "10 mV/g", [0.1, 0.3, 0.2], "g"),
         ("Channel A [mV]", "10 mV/m/s2", [0.1, 0.3, 0.2], "m/s2"),
         ("plain", "50 N/FS", [50.0, 150.0, 100.0], "N"),
+        ("plain", "12,5 N/FS", [12.5, 37.5, 25.0], "N"),
     ],
 )
 def test_other_quantities_keep_their_unit_or_are_calibrated(title, scale, values, unit, tmp_path):
