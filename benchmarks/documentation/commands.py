@@ -19,7 +19,7 @@ from typing import Any
 
 import click
 
-from chaosgym.cli import COMMANDS, app, former
+from chaosgym.cli import COMMANDS, app
 from chaosgym.cli.options import KEYS, recording_options
 from chaosgym.files import write_atomically
 from chaosgym.machines import MACHINES
@@ -115,18 +115,6 @@ def index() -> str:
             "",
             "A machine has options of its own, see [show](show.md#options) and `chaosgym COMMAND MACHINE --help`.",
             "",
-            "## Former spellings",
-            "",
-            "They work in this version, and a line on standard error says what to write. What they don't name stays.",
-            "",
-            "| former | write |",
-            "|---|---|",
-            *(f"| `{row.former}` | `{row.current}` |" for row in (*former.COMMANDS, *former.OPTIONS)),
-            *map(
-                _moved_key,
-                dict.fromkeys((option, key) for option, keys in former.KEYED.values() for key in keys.split()),
-            ),
-            "",
         ]
     )
 
@@ -184,15 +172,6 @@ def _run(line: str, folder: Path) -> str:
     told = done.stdout.replace(str(Path.home()), "~").replace(platform.platform(), platform.system())
     lines = told.splitlines(keepends=True)
     return "".join([*lines[:LONGEST], "...\n"] if len(lines) > LONGEST else lines)
-
-
-def _moved_key(moved: tuple[str, str]) -> str:
-    """Row of an option that one of KEY=VALUE took the place of."""
-    new, key = moved
-    names = ", ".join(
-        f"`{name}`" for name, (option, keys) in former.KEYED.items() if option == new and key in keys.split()
-    )
-    return f"| `--{key} VALUE` of {names} | `{new} {key}=VALUE` |"
 
 
 def _last_part(name: str) -> str:

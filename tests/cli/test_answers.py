@@ -65,7 +65,8 @@ QUICK = {
     "judge-sweep": f'{DOCS}/data/sweep.csv --sensor-error "3 N"',
     "monitor": "",
     "overlay": f"impact-beam {PEAKS} --out o.png",
-    "classify": f"impact-beam --frequency-hz 19; impact-beam --budget-us 0; impact-beam {PEAKS}",
+    "classify": "impact-beam --frequency-hz 19; impact-beam --budget-us 0;"
+    f"impact-beam {DOCS}/data/peaks.csv --read column=upper --sensor-error '1 N'",
     "sweep": MAP.removeprefix("sweep ") + " --out map --plot map.png",
     "dataset-info": "map",
     "dataset-map": "map --out map2.png",
@@ -83,7 +84,7 @@ LONG = {
     "tradeoff": "impact-beam --points 1 --cycles 20 --transient 20 --budget 0.05 --workers 1",
     "compare": f'{BEAM} --machines 2 --only "follow the demand" --out scores.parquet',
     "design": f"brief.toml --workers 1 --plot b.png; brief.toml other.toml --workers 1;"
-    f"other.toml --workers 1 --beside {PEAKS}",
+    f"other.toml --workers 1 --beside {DOCS}/data/peaks.csv --read column=upper --read 'sensor-error=1 N'",
     "demo": "--out demo",
     "train-classifier": "--data demo/sweep --out learned",
 }

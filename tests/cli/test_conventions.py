@@ -10,7 +10,7 @@ import time
 import click
 import pytest
 
-from chaosgym.cli import app
+from chaosgym.cli import COMMANDS, app
 
 CHAOSGYM = [sys.executable, "-m", "chaosgym"]
 
@@ -32,6 +32,13 @@ def test_every_command_gives_json():
     assert {"dataset info", "dataset map", "explore", "simulate"} <= set(commands)
     without = [name for name, command in commands.items() if "as_json" not in {p.name for p in command.params}]
     assert without == []
+
+
+@pytest.mark.parametrize("name", COMMANDS)
+def test_a_command_has_a_dozen_options_at_most(name):
+    """What is seldom stated is a key of one option, so that the help of a command stays short."""
+    options = app.get_command(click.Context(app), name).params
+    assert len([option for option in options if isinstance(option, click.Option)]) <= 12
 
 
 def completed(words, number):

@@ -109,9 +109,6 @@ def test_map_is_drawn(folder, tmp_path):
         (("dataset", "info", "nowhere"), "'nowhere' does not exist"),
         (("dataset", "info", "."), "holds no sweep"),
         (("dataset", "map", ".", "--out", "m.png"), "holds no finished sweep"),
-        (("dataset", "build", "impact-beam", "--crosses", "2"), "`python -m benchmarks build-dataset MACHINE`"),
-        (("dataset", "card", "."), "`chaosgym dataset info FOLDER`"),
-        (("stability", "impact-beam"), "`python -m benchmarks stability MACHINE`"),
         (("sweep", "impact-beam", "--sampling", "crosses:3:", "--out", "o"), "allowed: grid|random:N"),
         (
             ("sweep", "impact-beam", "--sampling", "crosses:3", "--axis", "length=0.27:0.28", "--out", "o"),

@@ -41,10 +41,11 @@ def check_files(seeds, tmp_path):
         record = make(kind, 6000 + seed)
         path = tmp_path / f"{number}.txt"
         written(record, path, number % 5)
-        options = [f"--{name.replace('_', '-')}={value:.9g}" for name, value in record.stated.items()]
+        stated = ["as=peaks", *(f"{name.replace('_', '-')}={value:.9g}" for name, value in record.stated.items())]
+        options = [word for each in stated for word in ("--read", each)]
         told = []
         for command in COMMANDS:
-            code, out, err = run(*command, path, "--as", "peaks", *options, "--json")
+            code, out, err = run(*command, path, *options, "--json")
             if code == 2 and "cycles are too few for a statistic" in err:
                 continue
             assert code == 0, err
@@ -90,7 +91,7 @@ def test_simulated_peaks_are_read_back(tmp_path):
         assert code == 2
         assert "'upper', 'lower'; use --column NAME" in err
         for command in COMMANDS:
-            code, out, err = run(*command, path, "--column", "upper", "--json")
+            code, out, err = run(*command, path, "--read", "column=upper", "--json")
             assert code == 0, err
             assert json.loads(out)["period"] == 1
         code, out, _ = run("judge", path, "--column", "upper", "--json")
@@ -103,7 +104,7 @@ def test_a_guessed_cycle_stands_in_the_headline(tmp_path):
     path = tmp_path / "series.csv"
     run("simulate", "impact-beam", "--frequency-hz", 20, "--cycles", 40, "--transient", 200, "--series-out", path)
     for command in COMMANDS:
-        code, out, err = run(*command, path, "--column", "force")
+        code, out, err = run(*command, path, "--read", "column=force")
         assert code == 0, err
         assert "periodic, period 1, if the cycle is 50 ms" in out
     code, out, _ = run("judge", path, "--column", "force", "--json")
@@ -133,6 +134,9 @@ def test_simulated_series_are_read_back(tmp_path):
     [
         (("judge", "-", "--sensor-error", "inf"), "is no finite number"),
         (("judge", "-", "--sensor-error", "3 furlong"), "is in furlong, no unit that is known; allowed: N, kN"),
+        (("judge", "-", "--sensor-sigma", "1"), "has no option --sensor-sigma; state --read sensor-sigma=VALUE"),
+        (("classify", "impact-beam", "-", "--column", "2"), "has no option --column; state --read column=VALUE"),
+        (("diagnose", "impact-beam", "--column", "2"), "diagnose has no option --column; allowed: --frequency-hz"),
         (("judge", "-", "--sensor-error", "3 m"), "in m, the readings are in N"),
         (
             ("judge", "-", "--read", "unit=Newtn"),

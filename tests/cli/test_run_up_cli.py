@@ -49,7 +49,8 @@ def test_a_run_up_is_told_in_lines_in_json_and_as_a_picture(recording, tmp_path)
 
 def test_a_tachometer_of_several_pulses_cuts_the_cycles_of_other_commands(recording):
     """``judge`` takes the turns for cycles: 449 of them, not four times as many."""
-    code, out, err = run("judge", recording, *OF_FILE, "--sensor-error", "0.05 g", "--json")
+    of_file = ("--column", "bearing", "--read", "tachometer=tacho", "--read", "pulses-per-revolution=4")
+    code, out, err = run("judge", recording, *of_file, "--sensor-error", "0.05 g", "--json")
     assert code == 0, err
     assert any("448 cycles" in note or "449 cycles" in note for note in json.loads(out)["warnings"])
 

@@ -47,16 +47,6 @@ COMMANDS = {
 }
 """Module in this folder and function of every command."""
 
-RESPELT = {"diagnose", "overlay", "classify", "design", "judge", "judge-sweep", "run-up", "fit", "monitor", "sweep"}
-"""Commands with former spellings."""
-
-MOVED = {
-    "dataset build": "`python -m benchmarks build-dataset MACHINE` makes it in a clone of the repository",
-    "stability": "`python -m benchmarks stability MACHINE` measures it in a clone of the repository",
-    "dataset card": "`chaosgym dataset info FOLDER` has what it wrote",
-}
-"""Former commands, and what to call instead."""
-
 ALIKE = 0.7
 """How alike an option must be to the one that was written, from 0 to 1, to be the one that was meant."""
 
@@ -68,15 +58,12 @@ BEYOND_THE_USER = (errno.ENOSPC, errno.EDQUOT, errno.EIO, errno.EROFS, errno.EFB
 
 
 class Group(click.Group):
-    """A group that says what took the place of a command that it had, and which one was probably meant."""
+    """A group that says which command was probably meant."""
 
     def resolve_command(
         self, ctx: click.Context, args: list[str]
     ) -> tuple[str | None, click.Command | None, list[str]]:
         """Return the command that is called, its name and its words."""
-        name = f"{ctx.info_name} {args[0]}" if ctx.parent else args[0]
-        if name in MOVED:
-            raise click.UsageError(f"there is no {name} any more: {MOVED[name]}", ctx)
         names = self.list_commands(ctx)
         if args[0] not in names and not args[0].startswith("-"):
             hint = nearest_or(f"allowed: {', '.join(names)}", args[0], names)
@@ -86,20 +73,6 @@ class Group(click.Group):
 
 class Commands(Group):
     """Commands that are imported when they are called."""
-
-    def parse_args(self, ctx: click.Context, args: list[str]) -> list[str]:
-        """Parse the arguments, in their former spelling too."""
-        if not ctx.resilient_parsing and args[:1] and args[0] in RESPELT and self._unknown_options(ctx, args):
-            from chaosgym.cli.former import rewritten
-
-            args = rewritten(args)
-        return super().parse_args(ctx, args)
-
-    def _unknown_options(self, ctx: click.Context, args: list[str]) -> set[str]:
-        """Options that the command does not have by itself: those of a machine, former ones and slips."""
-        command = self.get_command(ctx, args[0])
-        stated = {word.partition("=")[0] for word in args[1:] if word.startswith("--")}
-        return stated if command is None else stated - {name for one in command.params for name in one.opts}
 
     def list_commands(self, ctx: click.Context) -> list[str]:
         """Return the names of all commands."""
@@ -155,11 +128,17 @@ def run_command(command: click.Command) -> None:
 
 
 def _unknown_option(error: click.NoSuchOption) -> str:
-    """What to say of an option that a command has not: the one that was meant, or all."""
+    """What to say of an option that a command has not: the key of ``--read``, the one that was meant, or all."""
+    from chaosgym.cli.options import KEYS
+
     if error.ctx is None:
         return error.format_message()
     known = [name for one in error.ctx.command.get_params(error.ctx) for name in one.opts if name.startswith("--")]
-    hint = nearest_or(f"allowed: {', '.join(known)}", error.option_name, known, alike=ALIKE)
+    key = error.option_name.removeprefix("--")
+    if key in KEYS and "--read" in known:
+        hint = f"state --read {key}=VALUE"
+    else:
+        hint = nearest_or(f"allowed: {', '.join(known)}", error.option_name, known, alike=ALIKE)
     return f"{error.ctx.command_path} has no option {error.option_name}; {hint}"
 
 
