@@ -1,4 +1,4 @@
-"""A learned map of a fleet, from jobs at random speeds: one file, from arguments to a policy that numpy plays.
+"""A learned map of a fleet, from jobs at random speeds, to a policy that numpy plays.
 
     python agents/learn_map.py --keywords '{"level": "fleet", "split": "train"}' --seed 0 --out runs/map-0
 
@@ -10,9 +10,6 @@ progress.csv (a row an epoch, on an eighth of the machines that nothing is fitte
 """
 
 import argparse
-import io
-import json
-import sys
 import time
 from pathlib import Path
 from typing import Any, NamedTuple
@@ -22,15 +19,14 @@ import torch
 from numpy.typing import NDArray
 from torch import nn
 from tqdm import tqdm, trange
+from training import CHECKPOINT, keep_arrays, kept_arrays, keywords, run, write_rows
 
 from chaosgym.control.controllers.controller import place_of, seen
 from chaosgym.control.policies import save_policy
-from chaosgym.control.policies.checkpoint import CHECKPOINT, run_folder
 from chaosgym.control.policies.learned_map import CHANNELS, FeltSpeeds, LearnedMap, readings_of
 from chaosgym.control.policies.network import Dense, Network
 from chaosgym.envs.vector_env import MachineVectorEnv, native_envs
-from chaosgym.errors import ChaosgymError, ModelFileError
-from chaosgym.files import contents, unpacked, write_atomically
+from chaosgym.errors import ModelFileError
 
 Array = NDArray[Any]
 
@@ -49,15 +45,7 @@ SMALLEST = 0.1
 LOAD_WEIGHT = 0.3
 """Weight of the squared error of the load, in standard deviations, beside the cross-entropy of irregular motion."""
 
-LARGEST = 4_000_000_000
-"""Bytes that the jobs may have."""
-
 ROW = ("epoch", "irregular", "load", "irregular_unvisited", "processor_seconds")
-
-
-def keywords(text: str) -> dict[str, Any]:
-    """Keywords that an object of JSON names."""
-    return dict(json.loads(text))
 
 
 def arguments() -> argparse.Namespace:
@@ -111,18 +99,16 @@ def play(envs: MachineVectorEnv, seed: int, moves: float) -> Jobs:
 def gathered(asked: argparse.Namespace, envs: MachineVectorEnv) -> Jobs:
     """All jobs, those of other runs too; none that a folder holds is run again."""
     rounds = -(-asked.steps // (envs.num_envs * envs.task.steps))
-    known = _kept(asked.out)
+    known = kept_arrays(asked.out)
     for k in trange(rounds, desc=asked.out.name, unit="round"):
         if f"seen{k}" in known:
             continue
         jobs = play(envs, 1_000_000 * (asked.seed + 1) + k * envs.num_envs, asked.moves)
         known |= {f"{name}{k}": values for name, values in jobs._asdict().items()}
-        buffer = io.BytesIO()
-        np.savez(buffer, **known)  # type: ignore[arg-type]
-        _write(asked.out / CHECKPOINT, buffer.getvalue())
+        keep_arrays(asked.out, known)
     parts = _parts(known, rounds)
     for folder in asked.jobs:
-        other = _kept(folder)
+        other = kept_arrays(folder)
         parts += _parts(other, len(other) // len(Jobs._fields))
         if not other or parts[-1].seen.shape[::2] != parts[0].seen.shape[::2]:
             raise ModelFileError(f"{folder} holds no jobs of this task; give folders that this script wrote for it")
@@ -131,25 +117,12 @@ def gathered(asked: argparse.Namespace, envs: MachineVectorEnv) -> Jobs:
     return Jobs(*(np.concatenate(part, axis=1) for part in zip(*parts, strict=True)))
 
 
-def _kept(folder: Path) -> dict[str, Array]:
-    """Arrays of the jobs that a folder holds."""
-    path = folder / CHECKPOINT
-    try:
-        return dict(unpacked(contents(path, LARGEST), LARGEST)) if path.exists() else {}
-    except ValueError as error:
-        raise ModelFileError(f"{path} {error}") from None
-
-
 def _parts(known: dict[str, Array], rounds: int) -> list[Jobs]:
     """Jobs of each round."""
     try:
         return [Jobs(known[f"seen{k}"], known[f"irregular{k}"]) for k in range(rounds)]
     except KeyError as error:
         raise ModelFileError(f"a run's {CHECKPOINT} has no array {error}; it was not written by this script") from None
-
-
-def _write(path: Path, content: bytes) -> None:
-    write_atomically(path, lambda file: file.write_bytes(content))
 
 
 def usual(envs: MachineVectorEnv, seen_: Array) -> tuple[Array, Array]:
@@ -261,8 +234,7 @@ class Fit:
                 parts = [[float(loss) for loss in self.losses(chosen, hide=False)] for chosen in others.split(4096)]
             means = np.round(np.mean(parts, axis=0), 4).tolist()
             told.append((epoch + 1, *means, round(time.process_time())))
-        text = "".join(",".join(map(str, row)) + "\n" for row in told)
-        write_atomically(asked.out / "progress.csv", lambda path: path.write_text(text))
+        write_rows(asked.out, told)
 
     def exported(self) -> Network:
         """The network by numpy, its loads as logarithms of the mean peak [log N]."""
@@ -290,17 +262,5 @@ def train(asked: argparse.Namespace) -> None:
     print(f"policy in {asked.out}")
 
 
-def main() -> None:
-    """Train, and write the policy; say in one line what stops that."""
-    asked = arguments()
-    torch.set_num_threads(1)
-    try:
-        with run_folder(asked.out):
-            train(asked)
-    except ChaosgymError as error:
-        print(f"Error: {error}", file=sys.stderr)
-        sys.exit(2)
-
-
 if __name__ == "__main__":
-    main()
+    run(train, arguments())

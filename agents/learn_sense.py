@@ -10,9 +10,6 @@ to) and sense.npz.
 """
 
 import argparse
-import io
-import json
-import sys
 import time
 from pathlib import Path
 from typing import Any, NamedTuple
@@ -23,14 +20,12 @@ from numpy.typing import NDArray
 from scipy.stats import rankdata
 from torch import nn
 from tqdm import tqdm, trange
+from training import keep_arrays, kept_arrays, keywords, run, write_rows
 
 from chaosgym.control.controllers.controller import seen
-from chaosgym.control.policies.checkpoint import CHECKPOINT, run_folder
 from chaosgym.envs.entries import IrregularProbability
 from chaosgym.envs.sense import STATISTICS, Sense, logarithms, save_sense
 from chaosgym.envs.vector_env import MachineVectorEnv, native_envs
-from chaosgym.errors import ChaosgymError, ModelFileError
-from chaosgym.files import contents, unpacked, write_atomically
 
 Array = NDArray[Any]
 
@@ -46,15 +41,7 @@ FLOOR = 3e-3
 DROPOUT, DECAY = 0.1, 0.01
 """Part of the units that is left out in training, and decay of the weights."""
 
-LARGEST = 2_000_000_000
-"""Bytes that the rounds may have."""
-
 ROW = ("epoch", "cross_entropy", "area", "processor_seconds")
-
-
-def keywords(text: str) -> dict[str, Any]:
-    """Keywords that an object of JSON names."""
-    return dict(json.loads(text))
 
 
 def arguments() -> argparse.Namespace:
@@ -114,25 +101,14 @@ def play(asked: argparse.Namespace, round_: int) -> Rows:
 
 def gathered(asked: argparse.Namespace) -> Rows:
     """All rounds; none that the folder holds is run again."""
-    path, known = asked.out / CHECKPOINT, {}
+    known = kept_arrays(asked.out)
     rounds = -(-asked.steps // (asked.envs * native_envs(asked.env, 1, **asked.keywords).task.steps))
-    if path.exists():
-        try:
-            known = dict(unpacked(contents(path, LARGEST), LARGEST))
-        except ValueError as error:
-            raise ModelFileError(f"{path} {error}") from None
     for k in trange(rounds, desc=asked.out.name, unit="round"):
         if f"share{k}" in known:
             continue
         known |= {f"{name}{k}": values for name, values in play(asked, k)._asdict().items()}
-        buffer = io.BytesIO()
-        np.savez(buffer, **known)  # type: ignore[arg-type]
-        _write(path, buffer.getvalue())
+        keep_arrays(asked.out, known)
     return Rows(*(np.concatenate([known[f"{name}{k}"] for k in range(rounds)]) for name in Rows._fields))
-
-
-def _write(path: Path, content: bytes) -> None:
-    write_atomically(path, lambda file: file.write_bytes(content))
 
 
 def area(labels: Array, scores: Array) -> float:
@@ -172,8 +148,7 @@ def fit(asked: argparse.Namespace, rows: Rows, floor: float) -> Sense:
         wrong = float(nn.functional.binary_cross_entropy_with_logits(answer, shares[others]))
         reached = area(shares[others].numpy() > 0.5, answer.numpy())
         told.append((epoch + 1, round(wrong, 4), round(reached, 4), round(time.process_time())))
-    text = "".join(",".join(map(str, row)) + "\n" for row in told)
-    _write(asked.out / "progress.csv", text.encode())
+    write_rows(asked.out, told)
     dense = [layer for layer in network if isinstance(layer, nn.Linear)]
     weights, biases = (tuple(getattr(one, name).detach().numpy() for one in dense) for name in ("weight", "bias"))
     return scale._replace(weights=weights, biases=biases)
@@ -189,17 +164,5 @@ def train(asked: argparse.Namespace) -> None:
     print(f"sense in {asked.out}")
 
 
-def main() -> None:
-    """Train, and write the sense; say in one line what stops that."""
-    asked = arguments()
-    torch.set_num_threads(1)
-    try:
-        with run_folder(asked.out):
-            train(asked)
-    except ChaosgymError as error:
-        print(f"Error: {error}", file=sys.stderr)
-        sys.exit(2)
-
-
 if __name__ == "__main__":
-    main()
+    run(train, arguments())

@@ -1,4 +1,4 @@
-"""PPO on a speed schedule, with a memory of visited speeds: one file, from arguments to a policy that numpy plays.
+"""PPO on a speed schedule, with a memory of visited speeds, to a policy that numpy plays.
 
     python agents/ppo.py --env chaosgym/ImpactBeamTolerance-v1 --seed 0 --steps 300000 --out runs/ppo-0
 
@@ -7,36 +7,21 @@ The same command goes on with a run that was interrupted, and ends as if it had 
 """
 
 import argparse
-import json
-import sys
-import time
 from pathlib import Path
-from typing import Any
 
-import numpy as np
 import torch
 from stable_baselines3 import PPO
-from stable_baselines3.common.callbacks import BaseCallback
 from stable_baselines3.common.vec_env import VecMonitor, VecNormalize
-from tqdm import tqdm
+from training import Progress, keywords, load_checkpoint, run
 
 from chaosgym.control.policies import load_policy, save_policy
-from chaosgym.control.policies.checkpoint import load_checkpoint, run_folder, save_checkpoint
 from chaosgym.control.policies.export import exported
 from chaosgym.envs import SB3VecEnv, environment
 from chaosgym.envs.sb3 import SB3VisitedSpeeds
-from chaosgym.errors import ChaosgymError, ModelFileError
-from chaosgym.files import write_atomically
+from chaosgym.errors import ModelFileError
 
 HOLD_BIAS = 2.0
 """Logit of holding the speed at the start: motion settles only at a speed that is held."""
-
-ROW = ("step", "return", "type_iii", "deviation", "processor_seconds")
-
-
-def keywords(text: str) -> dict[str, Any]:
-    """Keywords that an object of JSON names."""
-    return dict(json.loads(text))
 
 
 def arguments() -> argparse.Namespace:
@@ -60,66 +45,6 @@ def arguments() -> argparse.Namespace:
     parser.add_argument("--units", type=int, default=64)
     parser.add_argument("--no-memory", dest="memory", action="store_false", help="See the last step and no other.")
     return parser.parse_args()
-
-
-class Progress(BaseCallback):
-    """Writes a row and a checkpoint every so many steps, when the model has learned from all that was collected."""
-
-    def __init__(self, asked: argparse.Namespace, kept: dict[str, Any] | None) -> None:
-        super().__init__()
-        self.asked = asked
-        self.kept = kept or {"rows": [ROW], "jobs": [], "sums": np.zeros((3, asked.envs)), "last": 0, "seconds": 0.0}
-        self.began = time.process_time() - self.kept["seconds"]
-
-    def _on_training_start(self) -> None:
-        steps = self.model.num_timesteps
-        if steps > 0:  # a folder without a checkpoint is no run: it stays empty until the first
-            self._write_rows()
-        self.bar = tqdm(total=self.asked.steps, initial=steps, unit="step", desc=self.asked.out.name)
-
-    def _on_step(self) -> bool:
-        self.bar.update(self.num_timesteps - self.bar.n)
-        sums = self.kept["sums"]
-        for i, info in enumerate(self.locals["infos"]):
-            sums[:, i] += 1.0, info["type_iii"], info["deviation"]
-            if "episode" in info:
-                steps, type_iii, deviation = sums[:, i]
-                self.kept["jobs"].append((info["episode"]["r"], type_iii / steps, deviation / steps))
-                sums[:, i] = 0.0
-        return True
-
-    def _on_rollout_start(self) -> None:
-        if self.model.num_timesteps - self.kept["last"] >= self.asked.every:
-            self._save()
-
-    def _on_training_end(self) -> None:
-        self.bar.close()
-        self._save()
-
-    def _save(self) -> None:
-        self.kept |= {"last": self.model.num_timesteps, "seconds": time.process_time() - self.began}
-        if self.kept["jobs"]:
-            means = np.round(np.mean(self.kept["jobs"], axis=0), 4)
-            self.kept["rows"].append((self.kept["last"], *means.tolist(), round(self.kept["seconds"])))
-            self.kept["jobs"] = []
-        save_checkpoint(self.asked.out, self.model, self.kept)
-        self._write_rows()
-
-    def _write_rows(self) -> None:
-        lines = [",".join(map(str, row)) + "\n" for row in self.kept["rows"]]
-        write_atomically(self.asked.out / "progress.csv", lambda path: path.write_text("".join(lines)))
-
-
-def main() -> None:
-    """Train, and write the policy; say in one line what stops that."""
-    asked = arguments()
-    torch.set_num_threads(1)
-    try:
-        with run_folder(asked.out):
-            train(asked)
-    except ChaosgymError as error:
-        print(f"Error: {error}", file=sys.stderr)
-        sys.exit(2)
 
 
 def environments(env: str, asked: argparse.Namespace) -> VecNormalize:
@@ -175,4 +100,4 @@ def train(asked: argparse.Namespace) -> None:
 
 
 if __name__ == "__main__":
-    main()
+    run(train, arguments())

@@ -17,7 +17,6 @@ from hypothesis import strategies as st
 
 from chaosgym.classifier.storage import read_model
 from chaosgym.control.policies import load_policy
-from chaosgym.control.policies.checkpoint import CHECKPOINT, load_checkpoint
 from chaosgym.control.policies.shipped import shipped_folder
 from chaosgym.design.brief import read_brief
 from chaosgym.design.brief import template as brief_template
@@ -166,6 +165,8 @@ def _dataset(folder, content):
 
 
 def _checkpoint(folder, content):
+    from agents.training import CHECKPOINT, load_checkpoint  # torch and stable-baselines3 take a second
+
     (folder / CHECKPOINT).write_bytes(content)
     load_checkpoint(folder, None, None)
 

@@ -35,6 +35,7 @@ def test_numbers_are_those_of_the_script(name, script, algorithm, monkeypatch):
     """Every number is the script's default; every other key is one of the algorithm or of the zoo."""
     told = yaml.safe_load((AGENTS / "hyperparams" / f"{name}.yml").read_text())["default"]
     monkeypatch.setattr(sys, "argv", [script])
+    monkeypatch.syspath_prepend(str(AGENTS))
     asked = runpy.run_path(str(AGENTS / f"{script}.py"))["arguments"]()
     for theirs, ours in SAME.items():
         if theirs in told:

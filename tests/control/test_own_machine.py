@@ -12,11 +12,11 @@ from stable_baselines3 import PPO
 from stable_baselines3.common.vec_env import VecNormalize
 
 import chaosgym
+from agents.training import load_checkpoint, save_checkpoint
 from chaosgym.control.comparison import compare
 from chaosgym.control.controllers import Follow
 from chaosgym.control.evaluation import Evaluation
 from chaosgym.control.policies import load_policy, save_policy
-from chaosgym.control.policies.checkpoint import load_checkpoint, save_checkpoint
 from chaosgym.control.policies.export import exported
 from chaosgym.control.rollout import play
 from chaosgym.control.scores import ONE, ZERO, Scores

@@ -7,10 +7,8 @@ import random
 
 import pytest
 
-from chaosgym.control.policies.checkpoint import CHECKPOINT, load_checkpoint, save_checkpoint
+from agents.training import CHECKPOINT, load_checkpoint, save_checkpoint
 from chaosgym.errors import ModelFileError
-
-pytest.importorskip("torch")
 
 
 class Env:

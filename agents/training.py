@@ -1,4 +1,6 @@
-"""Checkpoint of a training run: one file, whole or not there, that only its own user's programs load.
+"""What training scripts share: the folder of a run, its rows of progress, and its checkpoint.
+
+A checkpoint is one file, whole or not there, that only its own user's programs load.
 
 What stable-baselines3 saves is a pickle, and reading one may run anything. So a checkpoint begins with a keyed hash of
 the rest. The key is made at random for each user; a file that anybody else wrote is refused before it is read.
@@ -6,21 +8,30 @@ the rest. The key is made at random for each user; a file that anybody else wrot
 The checkpoint holds model, environments and random numbers, so that a run that goes on equals one that never stopped.
 """
 
+import argparse
 import hmac
 import io
+import json
 import os
 import pickle
 import random
 import secrets
-from collections.abc import Iterator
-from contextlib import contextmanager
+import sys
+import time
+from collections.abc import Callable, Iterator
 from pathlib import Path
 from typing import Any
 
 import numpy as np
+import torch
+from numpy.typing import NDArray
+from stable_baselines3.common.callbacks import BaseCallback
+from tqdm import tqdm
 
-from chaosgym.errors import ModelFileError
-from chaosgym.files import claimed, contents, held, write_atomically
+from chaosgym.errors import ChaosgymError, ModelFileError
+from chaosgym.files import claimed, contents, held, unpacked, write_atomically
+
+Array = NDArray[Any]
 
 CHECKPOINT = "checkpoint.bin"
 
@@ -39,19 +50,96 @@ UNSAVED = ("_last_lstm_states", "replay_buffer", "action_space")
 """Attributes of a model that ``save`` leaves out, or ``load`` seeds anew, of those algorithms that have them."""
 
 
-@contextmanager
-def run_folder(folder: Path) -> Iterator[None]:
-    """Keep the folder of a training run for this process: new, empty, or begun by a run before.
+ROW = ("step", "return", "type_iii", "deviation", "processor_seconds")
+"""Columns of progress."""
+
+
+def keywords(text: str) -> dict[str, Any]:
+    """Keywords that an object of JSON names."""
+    return dict(json.loads(text))
+
+
+def run(train: Callable[[argparse.Namespace], None], asked: argparse.Namespace) -> None:
+    """Train in a folder that is new, empty, or begun by a run before; say in one line what stops that."""
+    torch.set_num_threads(1)
+    try:
+        with held(claimed(asked.out, CHECKPOINT, "policy.json", what="folder of a training run")):
+            train(asked)
+    except ChaosgymError as error:
+        print(f"Error: {error}", file=sys.stderr)
+        sys.exit(2)
+
+
+def write_rows(folder: Path, rows: list[tuple[Any, ...]]) -> None:
+    """Write progress.csv."""
+    text = "".join(",".join(map(str, row)) + "\n" for row in rows)
+    write_atomically(folder / "progress.csv", lambda path: path.write_text(text))
+
+
+class Progress(BaseCallback):
+    """Writes a row and a checkpoint every so many steps, when the model has learned from all that was collected."""
+
+    def __init__(self, asked: argparse.Namespace, kept: dict[str, Any] | None) -> None:
+        super().__init__()
+        self.asked = asked
+        self.kept = kept or {"rows": [ROW], "jobs": [], "sums": np.zeros((3, asked.envs)), "last": 0, "seconds": 0.0}
+        self.began = time.process_time() - self.kept["seconds"]
+
+    def _on_training_start(self) -> None:
+        steps = self.model.num_timesteps
+        if steps > 0:  # a folder without a checkpoint is no run: it stays empty until the first
+            write_rows(self.asked.out, self.kept["rows"])
+        self.bar = tqdm(total=self.asked.steps, initial=steps, unit="step", desc=self.asked.out.name)
+
+    def _on_step(self) -> bool:
+        self.bar.update(self.num_timesteps - self.bar.n)
+        sums = self.kept["sums"]
+        for i, info in enumerate(self.locals["infos"]):
+            sums[:, i] += 1.0, info["type_iii"], info["deviation"]
+            if "episode" in info:
+                steps, type_iii, deviation = sums[:, i]
+                self.kept["jobs"].append((info["episode"]["r"], type_iii / steps, deviation / steps))
+                sums[:, i] = 0.0
+        return True
+
+    def _on_rollout_start(self) -> None:
+        if self.model.num_timesteps - self.kept["last"] >= self.asked.every:
+            self._save()
+
+    def _on_training_end(self) -> None:
+        self.bar.close()
+        self._save()
+
+    def _save(self) -> None:
+        self.kept |= {"last": self.model.num_timesteps, "seconds": time.process_time() - self.began}
+        if self.kept["jobs"]:
+            means = np.round(np.mean(self.kept["jobs"], axis=0), 4)
+            self.kept["rows"].append((self.kept["last"], *means.tolist(), round(self.kept["seconds"])))
+            self.kept["jobs"] = []
+        save_checkpoint(self.asked.out, self.model, self.kept)
+        write_rows(self.asked.out, self.kept["rows"])
+
+
+def keep_arrays(folder: Path, arrays: dict[str, Array]) -> None:
+    """Write arrays as the checkpoint of a run without a model."""
+    buffer = io.BytesIO()
+    np.savez(buffer, **arrays)  # type: ignore[arg-type]
+    write_atomically(folder / CHECKPOINT, lambda path: path.write_bytes(buffer.getvalue()))
+
+
+def kept_arrays(folder: Path) -> dict[str, Array]:
+    """Arrays of such a checkpoint; none where there is none.
 
     Raises
     ------
-    DatasetError
-        If it holds anything else. Nothing in it is touched.
-    UnfinishedError
-        If another process writes into it.
+    ModelFileError
+        If the file is none of this kind.
     """
-    with held(claimed(folder, CHECKPOINT, "policy.json", what="folder of a training run")):
-        yield
+    path = folder / CHECKPOINT
+    try:
+        return dict(unpacked(contents(path, LARGEST), LARGEST)) if path.exists() else {}
+    except ValueError as error:
+        raise ModelFileError(f"{path} {error}") from None
 
 
 def save_checkpoint(folder: Path, model: Any, kept: Any = None) -> None:
@@ -66,8 +154,6 @@ def save_checkpoint(folder: Path, model: Any, kept: Any = None) -> None:
     kept
         What else the run needs to go on; anything that pickle takes.
     """
-    import torch
-
     file = io.BytesIO()
     model.save(file)
     state = {
@@ -99,8 +185,6 @@ def load_checkpoint(folder: Path, kind: Any, envs: Any) -> tuple[Any, Any] | Non
     ModelFileError
         If the file is damaged, was written by another user or on another computer, or the environments differ.
     """
-    import torch
-
     path = folder / CHECKPOINT
     if not path.exists():
         return None
