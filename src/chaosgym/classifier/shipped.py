@@ -1,10 +1,9 @@
 """The shipped classifiers: the one of a machine, and a general one for machines that have none."""
 
 from functools import lru_cache
-from importlib import resources
-from importlib.resources.abc import Traversable
 
 from chaosgym.classifier.machine_classifier import NATURE, MachineClassifier
+from chaosgym.classifier.storage import shipped_file
 from chaosgym.errors import ModelFileError
 from chaosgym.machines import MACHINES, Machine
 
@@ -28,17 +27,12 @@ def default_classifier(machine_name: str) -> MachineClassifier:
     """
     if not has_classifier(machine_name):
         raise ModelFileError(f"no classifier is shipped for {machine_name}; train one with `chaosgym train-classifier`")
-    with resources.as_file(_shipped(machine_name)) as file:
-        return MachineClassifier.load(file)
+    return MachineClassifier.load(shipped_file(machine_name))
 
 
 def has_classifier(machine_name: str) -> bool:
     """Whether a classifier is shipped for a machine."""
-    return _shipped(machine_name).is_file()
-
-
-def _shipped(machine_name: str) -> Traversable:
-    return resources.files("chaosgym") / "weights" / f"{machine_name}.npz"
+    return shipped_file(machine_name).is_file()
 
 
 def classifier_for(machine: Machine) -> MachineClassifier:

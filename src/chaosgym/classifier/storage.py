@@ -7,6 +7,7 @@ import hashlib
 import io
 import json
 from collections.abc import Mapping
+from importlib import resources
 from pathlib import Path
 from typing import Any
 
@@ -69,6 +70,11 @@ def read_model(path: str | Path) -> tuple[dict[str, Any], dict[str, dict[str, An
         if isinstance(error, ModelFileError):
             raise
         raise ModelFileError(f"{path} can't be read as a classifier: {error}") from error
+
+
+def shipped_file(name: str) -> Path:
+    """Return the model file of a name that comes with the package, whether it exists or not."""
+    return Path(str(resources.files("chaosgym"))) / "weights" / f"{name}.npz"
 
 
 def model_hash(head: Mapping[str, Any], arrays: Mapping[str, Any]) -> str:

@@ -5,15 +5,13 @@ It was trained on machines of a fleet at speeds that ripple, with the share of i
 """
 
 from functools import lru_cache
-from importlib import resources
-from importlib.resources.abc import Traversable
 from pathlib import Path
 from typing import Any, NamedTuple
 
 import numpy as np
 
 from chaosgym.arrays import Array
-from chaosgym.classifier.storage import read_model, write_model
+from chaosgym.classifier.storage import read_model, shipped_file, write_model
 from chaosgym.errors import ModelFileError
 
 RECENT = 10
@@ -93,7 +91,7 @@ def load_sense(path: str | Path) -> Sense:
 
 def has_sense(machine_name: str) -> bool:
     """Whether a sense is shipped for a machine."""
-    return _shipped(machine_name).is_file()
+    return shipped_file(f"{machine_name}-sense").is_file()
 
 
 @lru_cache
@@ -113,9 +111,4 @@ def shipped_sense(machine_name: str) -> Sense:
     """
     if not has_sense(machine_name):
         raise ModelFileError(f"no sense is shipped for {machine_name}; train one with agents/learn_sense.py")
-    with resources.as_file(_shipped(machine_name)) as file:
-        return load_sense(file)
-
-
-def _shipped(machine_name: str) -> Traversable:
-    return resources.files("chaosgym") / "weights" / f"{machine_name}-sense.npz"
+    return load_sense(shipped_file(f"{machine_name}-sense"))
