@@ -98,13 +98,13 @@ def _kind(mode: int) -> str:
     return next((word for test, word in kinds if test(mode)), "a device")
 
 
-def contents(path: str | Path, largest: int, *, pipes: bool = False) -> bytes:
+def contents(path: str | Path, largest: int) -> bytes:
     """Bytes of a file.
 
     Parameters
     ----------
     path
-        Of a file; of a pipe too, if ``pipes``.
+        Of a file.
     largest
         Bytes that it may have.
 
@@ -115,7 +115,7 @@ def contents(path: str | Path, largest: int, *, pipes: bool = False) -> bytes:
     """
     try:
         about = os.stat(path)
-        if not (stat.S_ISREG(about.st_mode) or (pipes and stat.S_ISFIFO(about.st_mode))):
+        if not stat.S_ISREG(about.st_mode):
             raise ValueError(f"can't be read: it is {_kind(about.st_mode)}, not a file")
         if about.st_size > largest:
             raise ValueError(f"can't be read: it has {about.st_size} bytes; allowed: up to {largest}")

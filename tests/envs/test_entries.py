@@ -99,7 +99,7 @@ PLAYERS = {
     "own map": lambda: MapFollower([_maps()]),
     "schedule": lambda: Schedule([_maps()]),
     "common schedule": lambda: CommonSchedule(_maps()),
-    "looking ahead": lambda: RecedingHorizon(every=12),
+    "looking ahead": RecedingHorizon,
     "kriging": Kriging,
     "table": lambda: Table(_tables()),
     "trained": _policy,

@@ -12,7 +12,6 @@ References
 I. J. Good, The population frequencies of species and the estimation of population parameters, Biometrika 40 (1953).
 """
 
-from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Any
 
@@ -58,10 +57,10 @@ class PeakImpactDiagram:
         return float(np.ptp(self.location)) if len(self.location) else 0.0
 
 
-def peak_impacts(
-    record: CycleRecord, side: int | None = None, position: Callable[[Array], Array] | None = None
-) -> PeakImpactDiagram:
+def peak_impacts(record: CycleRecord, side: int | None = None) -> PeakImpactDiagram:
     """Peak Impact Diagram of one bearing surface, or of a whole bearing.
+
+    Impacts lie at the machine's ``bearing_place``, and else at the phase of the cycle [deg], relative to its mean.
 
     Parameters
     ----------
@@ -71,9 +70,6 @@ def peak_impacts(
     side
         Number of the surface, 0 for the one on which the contact force is positive. None takes the largest force of
         the cycle, whichever surface carries it: a ball joint is one surface all around.
-    position
-        Place on the bearing [m] at a phase [rad] of the cycle; the machine's own ``bearing_place`` if it has one, and
-        otherwise the phase itself [deg], relative to its mean.
 
     Raises
     ------
@@ -92,8 +88,6 @@ def peak_impacts(
     hit = np.flatnonzero(peaks > 0.0)
     sides, peaks = sides[hit], peaks[hit]
     phase = _phases(record, hit, sides)
-    if position is not None:
-        return PeakImpactDiagram(np.asarray(position(phase)), peaks, "m")
     if record.peak_vector is None:
         return PeakImpactDiagram(np.degrees(_unrolled(phase) - _middle(phase)), peaks, "deg of the cycle")
     machine: Any = record.machine

@@ -52,7 +52,6 @@ def matrix_update_test(
     form: Form = "attractors",
     transient: int = 200,
     cycles: int = 100,
-    tolerance: float = TOLERANCE,
     initial_state: MotionState | None = None,
 ) -> MachineDiagnosis:
     """Judge a machine by two runs with different matrix-update intervals.
@@ -68,8 +67,6 @@ def matrix_update_test(
     transient, cycles
         Cycles before the comparison (literal: of both runs, from rest; attractors: of the first run, after which each
         takes ``cycles`` more to settle), and compared.
-    tolerance
-        Difference, as a share of the largest peak force, that counts as agreement.
     initial_state
         Where both runs, or the transient, start; rest by default.
 
@@ -101,7 +98,7 @@ def matrix_update_test(
         start = simulate(machine, transient, initial_state).final_state if transient else initial_state
         runs = [simulate(one, cycles, start, transient=cycles) for one in (machine, other)]
         compare = compare_attractors
-    verdict = compare(*(run.peak_force for run in runs), tolerance=tolerance)
+    verdict = compare(*(run.peak_force for run in runs))
     evidence |= verdict.evidence
     return of_machine(verdict, evidence=evidence, horizon=transient + cycles, record=runs[0])
 
@@ -111,7 +108,7 @@ def neighbouring_interval(interval: float) -> float:
     return 360.0 / max(1, round(360.0 / interval * 5.0 / 6.0))
 
 
-def compare_outcomes(first: ArrayLike, second: ArrayLike, *, tolerance: float = TOLERANCE) -> Diagnosis:
+def compare_outcomes(first: ArrayLike, second: ArrayLike) -> Diagnosis:
     """Literal form: do two series agree in every cycle, or in none?
 
     Parameters
@@ -126,7 +123,7 @@ def compare_outcomes(first: ArrayLike, second: ArrayLike, *, tolerance: float = 
         undetermined.
     """
     one, two, scale = _pair(first, second)
-    agreeing = float(np.mean(np.max(np.abs(one - two), axis=1) <= tolerance * scale))
+    agreeing = float(np.mean(np.max(np.abs(one - two), axis=1) <= TOLERANCE * scale))
     judged = partial(Diagnosis, evidence={"agreeing_cycles": agreeing})
     if agreeing >= 0.95:
         return judged(nature="periodic", margin=agreeing, reason=f"runs agree in {agreeing:.0%} of the cycles")
@@ -135,7 +132,7 @@ def compare_outcomes(first: ArrayLike, second: ArrayLike, *, tolerance: float = 
     return judged(nature=nature, margin=max(0.0, 1.0 - 2.0 * agreeing), reason=reason)
 
 
-def compare_attractors(first: ArrayLike, second: ArrayLike, *, tolerance: float = TOLERANCE) -> Diagnosis:
+def compare_attractors(first: ArrayLike, second: ArrayLike) -> Diagnosis:
     """Attractor form: do two settled runs end in the same motion, or at least each in one that repeats?
 
     Parameters
@@ -148,7 +145,7 @@ def compare_attractors(first: ArrayLike, second: ArrayLike, *, tolerance: float 
     periods = [_period(one), _period(two)]
     evidence: dict[str, Any] = {"shift": shift, "distance": distance / scale, "periods": periods}
     judged = partial(Diagnosis, evidence=evidence)
-    apart, same = distance / (tolerance * scale), distance <= tolerance * scale
+    apart, same = distance / (TOLERANCE * scale), distance <= TOLERANCE * scale
     if all(period is not None for period in periods):
         reason = f"both runs repeat, {'the same motion' if same else 'but not the same motion'}"
         period = periods[0] if same else None

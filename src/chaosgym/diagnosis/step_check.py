@@ -128,7 +128,6 @@ def agree(one: Diagnosis, other: Diagnosis) -> bool:
 
 def step_check(
     machine: Machine,
-    given: MachineDiagnosis | None = None,
     *,
     budget: int = DEFAULT_BUDGET,
     sensor_error: float = 0.0,
@@ -140,8 +139,6 @@ def step_check(
     ----------
     machine
         What to judge, from rest.
-    given
-        Verdict with the first integrator, if it is known already.
     budget, sensor_error
         As in ``diagnose``.
     integrator
@@ -154,11 +151,10 @@ def step_check(
     (True, True)
     """
     chosen = integrator or machine.default_integrator
-    given = given or diagnose(machine, budget=budget, sensor_error=sensor_error, integrator=chosen)
-    finer = given
+    first = finer = diagnose(machine, budget=budget, sensor_error=sensor_error, integrator=chosen)
     for _ in range(REFINEMENTS):
         chosen = chosen.refined()
         coarser, finer = finer, diagnose(machine, budget=budget, sensor_error=sensor_error, integrator=chosen)
         if agree(coarser, finer):
-            return StepCheck(given, finer, settled=True)
-    return StepCheck(given, finer, settled=False)
+            return StepCheck(first, finer, settled=True)
+    return StepCheck(first, finer, settled=False)

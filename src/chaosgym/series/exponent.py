@@ -27,6 +27,9 @@ POLYNOMIAL = float(np.log(4.0))
 BLOCKS = 20
 """Blocks whose scatter gives the standard error."""
 
+FOLLOWED = 8
+"""Cycles over which neighbours are followed."""
+
 
 @dataclass(frozen=True, kw_only=True)
 class LyapunovExponent(Result):
@@ -97,9 +100,7 @@ def average_growth(log_growth: ArrayLike, cycle_period: float = 1.0, round_off: 
     )
 
 
-def exponent_from_series(
-    series: ArrayLike, *, dimension: int = 3, steps: int = 8, cycle_period: float = 1.0
-) -> LyapunovExponent:
+def exponent_from_series(series: ArrayLike, *, dimension: int = 3) -> LyapunovExponent:
     """Largest exponent of a measured series of one sample a cycle, by the divergence of nearest neighbours.
 
     Parameters
@@ -108,8 +109,6 @@ def exponent_from_series(
         Settled and nearly free of noise; 1000 cycles or more.
     dimension
         Number of successive samples that make a point.
-    steps
-        Cycles over which neighbours are followed.
 
     Raises
     ------
@@ -136,7 +135,7 @@ def exponent_from_series(
     if spread <= 1e-9 * float(np.max(np.abs(x))):
         raise DiagnosisError("the series is constant; allowed: a series that varies")
     points = np.lib.stride_tricks.sliding_window_view(x / spread, dimension)
-    usable = len(points) - steps
+    usable = len(points) - FOLLOWED
     from scipy.spatial import cKDTree
 
     distances, partners = cKDTree(points[:usable]).query(points[:usable], k=12)
@@ -148,15 +147,14 @@ def exponent_from_series(
         raise DiagnosisError("the series repeats: neighbours do not part, and there is no exponent to measure")
     partner = partners[kept, first[kept]]
     # distances of the newest sample of each point: no delay between divergence and cycle
-    gaps = np.abs(
-        x[kept[:, None] + dimension - 1 + np.arange(steps)] - x[partner[:, None] + dimension - 1 + np.arange(steps)]
-    )
+    newest = dimension - 1 + np.arange(FOLLOWED)
+    gaps = np.abs(x[kept[:, None] + newest] - x[partner[:, None] + newest])
     logs = np.log(np.maximum(gaps / spread, 1e-12))
     curve = logs.mean(axis=0)
     ceiling = float(np.mean(np.log(np.abs(np.subtract.outer(x[::7], x[3::7])) / spread + 1e-12)))
     rising = np.flatnonzero(curve > ceiling - 1.0)
-    last = max(2, int(rising[0]) if len(rising) else steps - 1)
+    last = max(2, int(rising[0]) if len(rising) else FOLLOWED - 1)
     if curve[0] > ceiling - 1.0:
         raise DiagnosisError("nearest neighbours are as far apart as any two points: noise, or far too few cycles")
     growth = (logs[:, last] - logs[:, 0]) / last
-    return average_growth(growth, cycle_period)
+    return average_growth(growth)

@@ -38,6 +38,9 @@ STRAIGHTNESS = 0.8
 DECAY_FACTOR = 4.0
 """How much they must shrink in all for the approach to count as periodic."""
 
+MOST_BANDS, LEAST_IN_A_BAND = 24, 30
+"""Bands that a series may visit in turn, and samples that each needs."""
+
 
 @dataclass(frozen=True)
 class Recurrence:
@@ -243,15 +246,15 @@ def _straightness(values: Array) -> float:
     return float(np.corrcoef(np.arange(len(values)), values)[0, 1] ** 2)
 
 
-def subtract_bands(series: Array, max_bands: int = 24, min_repeats: int = 30) -> tuple[Array, int]:
+def subtract_bands(series: Array) -> tuple[Array, int]:
     """Remove the mean of each band of a series that visits k bands in turn; (what is left, k).
 
-    k is the smallest number up to ``max_bands`` that leaves nearly the least variance. Without this step chaos in
+    k is the smallest number up to ``MOST_BANDS`` that leaves nearly the least variance. Without this step chaos in
     bands looks regular to the 0-1 test and to the spectrum, because the jumps between bands drown the rest.
     """
     n = len(series)
     best, variances = series - series.mean(), []
-    candidates = range(1, max(1, min(max_bands, n // min_repeats)) + 1)
+    candidates = range(1, max(1, min(MOST_BANDS, n // LEAST_IN_A_BAND)) + 1)
     for k in candidates:
         variances.append(float(np.sum(class_residual(series, k) ** 2)) / (n - k))
     least = min(variances)

@@ -11,6 +11,15 @@ from chaosgym.arrays import Array
 from chaosgym.control.controllers.controller import THRESHOLD, Controller, Observations, irregular, place_of, seen
 from chaosgym.control.maps import Maps
 
+PATIENCE, SPACING = 2, 2
+"""Steps before ``BackOff`` moves on, and trim steps between the rungs of its ladder."""
+
+PRIOR_WEIGHT, OPTIMISM = 2.0, 0.3
+"""Steps that the mean map of ``Bandit`` counts for, and standard deviations of the share that it subtracts."""
+
+HALF_WILD, SOFTNESS = 1.0, 0.1
+"""Measured irregularity at which a step of ``Bandit`` counts half, and the width over which it goes from 0 to 1."""
+
 
 class BackOff(Controller):
     """At the demand; if that is irregular for two steps, at the next offset of a ladder, and anew with each demand.
@@ -19,21 +28,15 @@ class BackOff(Controller):
     ----------
     remembers
         Whether speeds that were irregular in this job are skipped.
-    patience
-        Steps before it moves on.
-    spacing
-        Of the ladder, in trim steps.
     classified
         Whether the trained sense of ``classifier="on"`` says what is irregular, instead of a threshold.
     """
 
     knows = "measurements"
 
-    def __init__(
-        self, *, remembers: bool = True, patience: int = 2, spacing: int = 2, classified: bool = False
-    ) -> None:
+    def __init__(self, *, remembers: bool = True, classified: bool = False) -> None:
         super().__init__()
-        self.remembers, self.patience, self.spacing, self.classified = remembers, patience, spacing, classified
+        self.remembers, self.classified = remembers, classified
 
     @property
     def keywords(self) -> dict[str, Any]:
@@ -43,7 +46,7 @@ class BackOff(Controller):
     def begin(self, envs: Any) -> None:
         """Start at the demand."""
         task = self.task
-        sizes = np.arange(self.spacing, round(task.largest_trim / task.trim_step) + 1, self.spacing) * task.trim_step
+        sizes = np.arange(SPACING, round(task.largest_trim / task.trim_step) + 1, SPACING) * task.trim_step
         self.ladder = np.array([0.0, *(sign * size for size in sizes for sign in (-1.0, 1.0))])
         self._rung, self._wild = np.zeros(self.count, int), np.zeros(self.count, int)
         self._demand = np.full(self.count, np.nan)
@@ -59,7 +62,7 @@ class BackOff(Controller):
         self._demand = demand
         self._wild = np.where(there & wild & ~new, self._wild + 1, np.where(there, 0, self._wild))
         self._rung[new], self._wild[new] = 0, 0
-        moves = self._wild >= self.patience
+        moves = self._wild >= PATIENCE
         if self.remembers:
             self._bad[every[moves], place_of(speed, self.task)[moves]] = True
         self._rung[moves] = (self._rung[moves] + 1) % len(self.ladder)
@@ -107,34 +110,19 @@ class Bandit(Controller):
     ----------
     fleet
         Maps of models within tolerances.
-    weight
-        Steps that the mean map counts for.
-    optimism
-        Standard deviations of the share that are subtracted from the expected share at a speed.
-    threshold, softness
-        Measured irregularity at which a step counts half, and the width over which its weight goes from 0 to 1.
     """
 
     knows = "tolerances"
 
-    def __init__(
-        self,
-        fleet: Maps,
-        *,
-        weight: float = 2.0,
-        optimism: float = 0.3,
-        threshold: float = 1.0,
-        softness: float = 0.1,
-    ) -> None:
+    def __init__(self, fleet: Maps) -> None:
         super().__init__()
-        self.fleet, self.weight, self.optimism = fleet, weight, optimism
-        self.threshold, self.softness = threshold, softness
+        self.fleet = fleet
 
     def begin(self, envs: Any) -> None:
         """Start with the mean map."""
         prior = self.fleet.share.mean(axis=0)
-        self._wild = np.tile(self.weight * prior, (self.count, 1)) + 0.05
-        self._calm = np.tile(self.weight * (1.0 - prior), (self.count, 1)) + 0.05
+        self._wild = np.tile(PRIOR_WEIGHT * prior, (self.count, 1)) + 0.05
+        self._calm = np.tile(PRIOR_WEIGHT * (1.0 - prior), (self.count, 1)) + 0.05
         self._speed = np.full(self.count, np.nan)
 
     def speeds(self, observations: Observations) -> Array:
@@ -142,13 +130,13 @@ class Bandit(Controller):
         grid, speed = self.fleet.speeds, seen(observations, "speed")
         held = np.abs(speed - self._speed) < 0.5 * self.task.trim_step
         self._speed = speed
-        chance = irregular(observations, self.task, self.threshold, self.softness, self.sure)
+        chance = irregular(observations, self.task, HALF_WILD, SOFTNESS, self.sure)
         near = np.exp(-0.5 * ((grid - speed[:, None]) / self.task.trim_step) ** 2) * held[:, None]
         self._wild += near * chance[:, None]
         self._calm += near * (1.0 - chance)[:, None]
         counted = self._wild + self._calm
         share = self._wild / counted
         doubt = np.sqrt(share * (1.0 - share) / (counted + 1.0))
-        hoped, demand = share - self.optimism * doubt, seen(observations, "demand")
+        hoped, demand = share - OPTIMISM * doubt, seen(observations, "demand")
         cost = self.cost(hoped, self.fleet.damage(self.task).mean(axis=0), demand, grid)
         return np.asarray(grid[cost.argmin(axis=1)])

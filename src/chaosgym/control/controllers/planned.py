@@ -168,24 +168,17 @@ def best_schedule(cost: Array, start: NDArray[np.int64], reach: int) -> NDArray[
     return places
 
 
-HORIZON = 24
-"""Cycles that are simulated ahead."""
+HORIZON, EVERY = 24, 10
+"""Cycles that are simulated ahead, and steps between searches."""
+
+USUAL_MISS, TEMPER = 1.33, 0.5
+"""Miss of a mean peak, in errors of the sensor, that is nothing unusual, and share of a step's evidence that counts."""
 
 
 class RecedingHorizon(Controller):
-    """Searches anew every ten steps and when the demand changes; copies of the nominal model run beside the machines.
-
-    Parameters
-    ----------
-    every
-        Steps between searches.
-    """
+    """Searches every ten steps and when the demand changes; copies of the nominal model run beside the machines."""
 
     knows = "model"
-
-    def __init__(self, *, every: int = 10) -> None:
-        super().__init__()
-        self.every = every
 
     def begin(self, envs: Any) -> None:
         """Start the copies as the machines were started."""
@@ -204,7 +197,7 @@ class RecedingHorizon(Controller):
         if self._step:
             self._batch.set_speeds(np.arange(self.count), seen(observations, "speed"))
             self._batch.run(np.arange(self.count), task.cycles_per_step)
-        due = (demand != self._demand) | (self._step % self.every == 0)
+        due = (demand != self._demand) | (self._step % EVERY == 0)
         self._demand = demand
         self._step += 1
         if due.any():
@@ -233,17 +226,13 @@ class Belief(Controller):
     ----------
     fleet
         Maps of models within tolerances.
-    spread
-        Miss of a mean peak, in units of the sensor's error, that is nothing unusual.
-    temper
-        Share of the evidence of a step that counts, since steps are alike.
     """
 
     knows = "tolerances"
 
-    def __init__(self, fleet: Maps, *, spread: float = 1.33, temper: float = 0.5) -> None:
+    def __init__(self, fleet: Maps) -> None:
         super().__init__()
-        self.fleet, self.spread, self.temper = fleet, spread, temper
+        self.fleet = fleet
 
     def begin(self, envs: Any) -> None:
         """Start from a uniform prior over the simulated machines."""
@@ -258,9 +247,9 @@ class Belief(Controller):
         held = np.abs(speed - self._speed) < 0.5 * self.task.trim_step
         self._speed = speed
         place = self.fleet.nearest(speed)
-        error = self.spread * max(self.task.sensor_error, 1e-3 * self.task.reference_force)
+        error = USUAL_MISS * max(self.task.sensor_error, 1e-3 * self.task.reference_force)
         miss = (seen(observations, "mean_peak_force")[:, None] - self.fleet.mean_peak[:, place].T) / error
-        self._fit -= self.temper * np.where(held[:, None], np.log1p(0.5 * miss**2), 0.0)
+        self._fit -= TEMPER * np.where(held[:, None], np.log1p(0.5 * miss**2), 0.0)
         weight = np.exp(self._fit - self._fit.max(axis=1, keepdims=True))
         weight /= weight.sum(axis=1, keepdims=True)
         self._wild[every, place] += irregular(observations, self.task, THRESHOLD, 0.1, self.sure) * held
