@@ -9,6 +9,7 @@ from scipy.io import savemat
 from chaosgym.errors import DiagnosisError
 from chaosgym.recordings.columns import is_clock
 from chaosgym.recordings.cycles import peaks_of_series, series_of
+from chaosgym.recordings.kind import RecordingOptions
 from chaosgym.recordings.read import read_recording
 from chaosgym.recordings.sampling import sampling
 from chaosgym.units import duration
@@ -85,7 +86,7 @@ def test_clocks_that_cannot_be_told_are_a_question(heading, row, message, tmp_pa
     with pytest.raises(DiagnosisError, match=message) as error:
         peaks_of_series(recording)
     assert "\n" not in str(error.value)
-    signal, cut = peaks_of_series(recording, rate_hz=RATE)
+    signal, cut = peaks_of_series(recording, RecordingOptions(rate_hz=RATE))
     assert signal.described.endswith("; 6 s at 1000 Hz as stated")
     assert cut.period == pytest.approx(0.05, rel=1e-3)
 
@@ -93,9 +94,9 @@ def test_clocks_that_cannot_be_told_are_a_question(heading, row, message, tmp_pa
 def test_a_stated_rate_that_contradicts_the_file_is_said(tmp_path):
     """A rate of 500 Hz over stamps of 1000 Hz doubles every time: who stated it reads what the file says."""
     recording = series(tmp_path, "time [s],force\n", lambda k, x: f"{k / RATE:.4f},{x}")
-    signal, _ = peaks_of_series(recording, rate_hz=0.5 * RATE)
+    signal, _ = peaks_of_series(recording, RecordingOptions(rate_hz=0.5 * RATE))
     assert signal.described.endswith("at 500 Hz as stated, instead of 1000 Hz by column 'time' [s]")
-    assert peaks_of_series(recording, rate_hz=RATE)[0].described.endswith("at 1000 Hz as stated")
+    assert peaks_of_series(recording, RecordingOptions(rate_hz=RATE))[0].described.endswith("at 1000 Hz as stated")
 
 
 def test_two_rates_of_a_file_are_a_question(tmp_path):
@@ -107,7 +108,7 @@ def test_two_rates_of_a_file_are_a_question(tmp_path):
         DiagnosisError, match=r"several rates: bearing.sr = 97656 Hz, bearing.rate = 25 Hz; use --read rate-hz"
     ):
         peaks_of_series(recording)
-    assert peaks_of_series(recording, rate_hz=97656.0)[0].described.endswith("at 97656 Hz as stated")
+    assert peaks_of_series(recording, RecordingOptions(rate_hz=97656.0))[0].described.endswith("at 97656 Hz as stated")
 
 
 def test_rates_that_agree_are_no_question(tmp_path):
@@ -122,7 +123,7 @@ def test_a_signal_may_end_in_time_and_a_speed_beside_it_is_offered(tmp_path):
     """The bearing data of Case Western Reserve University: ``X097_DE_time`` is the accelerometer at the drive end."""
     path = tmp_path / "97.mat"
     savemat(path, {"X097_DE_time": FORCE[:, None] - 25.0, "X097RPM": np.array([[1796]])})
-    signal, cut = peaks_of_series(read_recording(path), rate_hz=12_000.0)
+    signal, cut = peaks_of_series(read_recording(path), RecordingOptions(rate_hz=12_000.0))
     assert signal.name == "X097_DE_time"
     assert cut.notes[-1] == "the file states X097RPM = 1796; if that is the speed, state it"
 
@@ -136,7 +137,7 @@ def test_channels_of_their_own_rate_keep_it(tmp_path):
             file[name].attrs["fs"] = rate
     recording = read_recording(tmp_path / "a")
     for name, told in (("front", "6 s at 1000 Hz"), ("rear", "12 s at 500 Hz")):
-        assert series_of(recording, name)[0].described.endswith(f"; {told} by the channel")
+        assert series_of(recording, RecordingOptions(column=name))[0].described.endswith(f"; {told} by the channel")
     assert recording.rate_hz is None
 
 

@@ -8,6 +8,7 @@ import pytest
 from chaosgym.errors import DiagnosisError
 from chaosgym.recordings.columns import choose_force
 from chaosgym.recordings.cycles import peaks_of_series
+from chaosgym.recordings.kind import RecordingOptions
 from chaosgym.recordings.quantities import split_unit
 from chaosgym.recordings.read import read_recording
 from chaosgym.recordings.sampling import choose_time, sampling
@@ -84,7 +85,7 @@ def test_marks_of_missing_readings_are_counted(mark, tmp_path):
     path = tmp_path / "record.csv"
     shown = [f"{t:.5f},{mark if i == 33 else x}\n" for i, (t, x) in enumerate(ROWS)]
     path.write_text("Time [s],Force [N]\n" + "".join(shown))
-    signal, cut = peaks_of_series(read_recording(path), period=10 * STEP)
+    signal, cut = peaks_of_series(read_recording(path), RecordingOptions(period=10 * STEP))
     assert "1 of them missing, the first in line 35" in signal.described
     assert any("1 cycles left out" in note for note in cut.notes)
     path.write_text("Time [s],Force [N]\n" + "".join(shown[30:50]))
@@ -172,7 +173,7 @@ def test_a_heading_repeated_amid_the_data_is_told(tmp_path):
     path = tmp_path / "record.csv"
     head = "Time [s],Force [N]\n"
     path.write_text(head + rows("{t:.5f},{x}\n", ROWS[:30]) + head + rows("{t:.5f},{x}\n", ROWS[30:]))
-    signal, _ = peaks_of_series(read_recording(path), period=10 * STEP)
+    signal, _ = peaks_of_series(read_recording(path), RecordingOptions(period=10 * STEP))
     assert "a heading repeated amid the data left out, first in line 32" in signal.described
     assert len(signal.values) == COUNT
 

@@ -13,6 +13,7 @@ from chaosgym.numbers import number
 from chaosgym.recordings.columns import Signal, choose_force, named_column
 from chaosgym.recordings.cycle_estimate import FEWEST_SAMPLES, estimated_cycle, strongest_line_nearby
 from chaosgym.recordings.description import Sampled
+from chaosgym.recordings.kind import RecordingOptions
 from chaosgym.recordings.read import Recording
 from chaosgym.recordings.sampling import Sampling, sampling
 from chaosgym.recordings.tachometer import Turns, turns_of
@@ -26,6 +27,9 @@ PHASES = 64
 
 FULL = 0.9
 """Share of its samples that a cycle must have."""
+
+NOTHING_STATED = RecordingOptions()
+"""Where the recording tells all."""
 
 
 @dataclass(frozen=True)
@@ -208,14 +212,7 @@ def _largest(value: Array, instants: Sampling, starts: Array) -> tuple[Array, Ar
 
 
 def series_of(
-    recording: Recording,
-    column: str | None = None,
-    unit: str | None = None,
-    *,
-    rate_hz: float | None = None,
-    tachometer: str | None = None,
-    pulses_per_revolution: int = 1,
-    scale: str | None = None,
+    recording: Recording, options: RecordingOptions = NOTHING_STATED
 ) -> tuple[Signal, Sampling, Turns | None]:
     """The force column of a series, its sampling, and the turns by its tachometer, if there is one.
 
@@ -223,12 +220,8 @@ def series_of(
     ----------
     recording
         What was read.
-    column, unit, scale
-        Of the force, as for ``choose_force``.
-    rate_hz
-        Sampling rate, if there is no time column.
-    tachometer, pulses_per_revolution
-        Column of a tachometer, and its pulses of a turn.
+    options
+        What is stated of it; its column means one.
 
     Raises
     ------
@@ -248,13 +241,13 @@ def series_of(
     >>> signal.values.max().item(), instants.time[-1].item(), turns
     (5.0, 0.2, None)
     """
-    tachometer = None if tachometer is None else named_column(recording, tachometer)
-    if column is None and tachometer is not None:
+    tachometer = None if options.tachometer is None else named_column(recording, options.tachometer)
+    others = recording
+    if options.column is None and tachometer is not None:
         rest = {name: values for name, values in recording.columns.items() if name != tachometer}
-        signal = choose_force(replace(recording, columns=rest), None, unit, scale)
-    else:
-        signal = choose_force(recording, column, unit, scale)
-    instants = sampling(recording, len(signal.values), rate_hz, signal.name)
+        others = replace(recording, columns=rest)
+    signal = choose_force(others, options.column, options.unit, options.scale)
+    instants = sampling(recording, len(signal.values), options.rate_hz, signal.name)
     size = min(len(signal.values), instants.size)
     instants = instants.shortened(size)
     signal = signal._replace(values=signal.values[:size], described=f"{signal.described}; {instants}")
@@ -265,55 +258,36 @@ def series_of(
     pulses = recording.columns[tachometer][:size]
     if len(pulses) < size:
         raise DiagnosisError(f"{recording.source}: {tachometer!r} ends before {signal.name!r}")
-    return signal, instants, turns_of(pulses, instants.time, pulses_per_revolution)
+    return signal, instants, turns_of(pulses, instants.time, options.pulses_per_revolution or 1)
 
 
-def peaks_of_series(
-    recording: Recording,
-    column: str | None = None,
-    unit: str | None = None,
-    *,
-    rate_hz: float | None = None,
-    period: float | None = None,
-    tachometer: str | None = None,
-    pulses_per_revolution: int = 1,
-    scale: str | None = None,
-) -> tuple[Signal, CyclePeaks]:
+def peaks_of_series(recording: Recording, options: RecordingOptions = NOTHING_STATED) -> tuple[Signal, CyclePeaks]:
     """Peaks of the series in a recording: its force column, and the peak of each cycle.
 
     Parameters
     ----------
     recording
         What was read.
-    column, unit, scale, rate_hz, tachometer, pulses_per_revolution
-        As for ``series_of``.
-    period
-        Operating cycle [s].
+    options
+        What is stated of it; its column means one.
 
     Examples
     --------
     >>> from pathlib import Path
     >>> from tempfile import TemporaryDirectory
     >>> from chaosgym.recordings.cycles import peaks_of_series
+    >>> from chaosgym.recordings.kind import RecordingOptions
     >>> t = np.arange(2000) / 1000.0
     >>> rows = "\\n".join(f"{s:.3f},{10.0 + np.sin(20.0 * np.pi * s):.6f}" for s in t)
     >>> with TemporaryDirectory() as folder:
     ...     file = Path(folder) / "series.csv"
     ...     _ = file.write_text("time s,force N\\n" + rows)
-    ...     force, cycles = peaks_of_series(chaosgym.read_recording(file), period=0.1)
+    ...     force, cycles = peaks_of_series(chaosgym.read_recording(file), RecordingOptions(period=0.1))
     >>> len(cycles.peaks), float(cycles.peaks[5])
     (19, 11.0)
     """
-    signal, instants, turns = series_of(
-        recording,
-        column,
-        unit,
-        rate_hz=rate_hz,
-        tachometer=tachometer,
-        pulses_per_revolution=pulses_per_revolution,
-        scale=scale,
-    )
-    cut = cycle_peaks(signal.values, instants, period, turns)
+    signal, instants, turns = series_of(recording, options)
+    cut = cycle_peaks(signal.values, instants, options.period, turns)
     if cut.condition and recording.speeds:
         listed = ", ".join(f"{key} = {speed:g}" for key, speed in recording.speeds.items())
         cut = replace(cut, notes=(*cut.notes, f"the file states {listed}; if that is the speed, state it"))

@@ -279,16 +279,7 @@ def _of_series(
     """One column of a series, cut into cycles, which a file of peaks does without."""
     from chaosgym.recordings.cycles import peaks_of_series
 
-    signal, cut = peaks_of_series(
-        recording,
-        name,
-        options.unit,
-        rate_hz=options.rate_hz,
-        period=options.period,
-        tachometer=options.tachometer,
-        pulses_per_revolution=options.pulses_per_revolution or 1,
-        scale=options.scale,
-    )
+    signal, cut = peaks_of_series(recording, replace(options, column=name))
     notes = (f"read {signal.described}, as a series: {why}", f"{len(cut.peaks)} cycles", *cut.notes)
     if of_force:
         ask_for_force(recording.source, signal)

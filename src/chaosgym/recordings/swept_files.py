@@ -181,15 +181,7 @@ def judged_run_up(source: str | Path, options: RecordingOptions, *, highest: flo
     if options.tachometer is None:
         raise DiagnosisError("a run-up needs a tachometer; state --tachometer NAME")
     recording = read_recording(source, sheet=options.sheet, column=options.column)
-    signal, instants, turns = series_of(
-        recording,
-        options.column,
-        options.unit,
-        rate_hz=options.rate_hz,
-        tachometer=options.tachometer,
-        pulses_per_revolution=options.pulses_per_revolution or 1,
-        scale=options.scale,
-    )
+    signal, instants, turns = series_of(recording, options)
     assert turns is not None
     result = run_up(
         signal.values,
