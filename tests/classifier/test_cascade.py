@@ -10,7 +10,7 @@ from chaosgym.classifier import classifier_for, default_classifier
 from chaosgym.classifier.answer import neighbours_of, type_probabilities
 from chaosgym.classifier.cascade import LONGEST_PERIOD, REPEATS, RETURNED
 from chaosgym.diagnosis import diagnose
-from chaosgym.diagnosis.proof import returning_period
+from chaosgym.diagnosis.periodic_orbit import returning_period
 from chaosgym.diagnosis.type_rule import type_of_cross
 from chaosgym.errors import ModelFileError
 from chaosgym.machines import ImpactBeam

@@ -4,8 +4,7 @@ import pytest
 
 import chaosgym
 from chaosgym.branches.coexistence import coexistence
-from chaosgym.explore.beside import beside_of
-from chaosgym.explore.point import check_cost, view_of
+from chaosgym.explore.point import beside_of, check_cost, view_of
 from chaosgym.machines import ImpactBeam
 from tests.diagnosis.coexisting import trilinear
 

@@ -24,8 +24,7 @@ from chaosgym.arrays import Array
 from chaosgym.classifier.answer import NatureAnswer
 from chaosgym.classifier.estimator import ResponseClassifier
 from chaosgym.classifier.features import MAX_CYCLES, response_features
-from chaosgym.diagnosis.periodic_orbit import PeriodicOrbit, find_periodic_orbit
-from chaosgym.diagnosis.proof import proven_orbit, returning_period
+from chaosgym.diagnosis.periodic_orbit import PeriodicOrbit, find_periodic_orbit, proven_orbit, returning_period
 from chaosgym.errors import SimulationError
 from chaosgym.machines import Machine
 from chaosgym.simulation import CycleRecord, simulate

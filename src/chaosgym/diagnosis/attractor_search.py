@@ -5,10 +5,15 @@ chaotic set. One whose section returns is handed to Newton's method, which prove
 256 cycles is diagnosed: chaotic and quasiperiodic motions are sets of states. Some starts on a set run on to the end of
 the budget; if one leaves it for an orbit, all do, since that chaos is transient. Of what no test decides at the end of
 the budget a few are diagnosed for longer; the rest is reported as unsettled. At last Newton's method looks for stable
-orbits from states of each set.
+orbits from states of each set that nearly return: starts seldom reach those that chaos of thousands of cycles hides.
+
+References
+----------
+D. P. Lathrop, E. J. Kostelich, Characterization of an experimental strange attractor by periodic orbits, Phys. Rev. A
+40 (1989) 4028-4031: near returns.
 """
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 from functools import partial
 
@@ -19,9 +24,7 @@ from chaosgym.core import matrices
 from chaosgym.diagnosis.attractor import Attractor, of_orbit
 from chaosgym.diagnosis.diagnose import diagnose_alone
 from chaosgym.diagnosis.known_motions import KnownMotions, path_of
-from chaosgym.diagnosis.near_returns import LONGEST, TRIED, stable_orbits
-from chaosgym.diagnosis.periodic_orbit import PeriodicOrbit, find_periodic_orbit
-from chaosgym.diagnosis.proof import NEAR, primitive, returning_period
+from chaosgym.diagnosis.periodic_orbit import NEAR, PeriodicOrbit, find_periodic_orbit, primitive, returning_period
 from chaosgym.diagnosis.start_box import StartBox
 from chaosgym.diagnosis.verdict import MachineDiagnosis
 from chaosgym.errors import SimulationError
@@ -53,6 +56,12 @@ NEWTON = 8
 
 RETURNS = 1e-2
 """Largest miss of a section that is handed to Newton's method, relative to the same."""
+
+LONGEST = 6
+"""Longest period that is looked for [cycles]."""
+
+TRIED = 8
+"""Nearest returns of each period from which Newton's method starts."""
 
 
 @dataclass
@@ -283,3 +292,33 @@ def _miss(path: Array, period: int) -> float:
     """Largest of the last distances between states (k, n) that lie a period apart."""
     last = min(4, len(path) - period)
     return float(np.max(np.linalg.norm(path[-last:] - path[-last - period : len(path) - period], axis=1)))
+
+
+def stable_orbits(machine: Machine, states: Array, weight: Array) -> Iterator[PeriodicOrbit]:
+    """Certified orbits that Newton's method reaches from near returns; one may come several times.
+
+    Parameters
+    ----------
+    machine
+        What runs.
+    states : (k, n_states)
+        Of a motion that does not repeat, a cycle apart.
+    weight : (n_states,)
+        Of a distance between states.
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> from chaosgym.diagnosis.attractor_search import stable_orbits
+    >>> beam = chaosgym.ImpactBeam(excitation_frequency=30.0)
+    >>> states = chaosgym.simulate(beam, 200, transient=200).states
+    >>> list(stable_orbits(beam, states, np.ones(states.shape[1])))
+    []
+    """
+    scaled = weight * states
+    for period in range(1, min(LONGEST, len(states) - 1) + 1):
+        apart = np.linalg.norm(scaled[period:] - scaled[:-period], axis=1)
+        for place in np.argsort(apart, kind="stable")[:TRIED].tolist():
+            orbit = find_periodic_orbit(machine, states[place], period)
+            if orbit is not None and orbit.certified:
+                yield orbit

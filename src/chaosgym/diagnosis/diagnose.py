@@ -28,8 +28,7 @@ from numpy.typing import ArrayLike
 from chaosgym.arrays import Array
 from chaosgym.diagnosis.lyapunov import Deviation
 from chaosgym.diagnosis.matrix_update import FIELD, depends_on_configuration, matrix_update_test, neighbouring_interval
-from chaosgym.diagnosis.periodic_orbit import PeriodicOrbit
-from chaosgym.diagnosis.proof import proven_orbit, returning_period
+from chaosgym.diagnosis.periodic_orbit import PeriodicOrbit, proven_orbit, returning_period
 from chaosgym.diagnosis.stage import Stage, not_periodic, periodic, periodic_within, votes, without_contact
 from chaosgym.diagnosis.verdict import MachineDiagnosis, of_machine
 from chaosgym.errors import DiagnosisError

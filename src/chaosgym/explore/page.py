@@ -31,12 +31,13 @@ from bokeh.server.server import Server
 from chaosgym.arrays import Array
 from chaosgym.diagnosis import CalmRegion
 from chaosgym.errors import ChaosgymError
-from chaosgym.explore.beside import LOOKING, beside_of
 from chaosgym.explore.gate import guard, new_secret
 from chaosgym.explore.moving import MovingSketch
 from chaosgym.explore.playback import Playback
 from chaosgym.explore.point import (
+    LOOKING,
     PointView,
+    beside_of,
     command_of,
     link_of,
     machine_from,

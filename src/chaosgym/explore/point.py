@@ -9,6 +9,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from chaosgym.arrays import Array
+from chaosgym.branches.coexistence import coexistence
 from chaosgym.classifier import classifier_for
 from chaosgym.diagnosis import MachineDiagnosis, diagnose
 from chaosgym.errors import ChaosgymError, ParameterError, SimulationError
@@ -20,6 +21,12 @@ from chaosgym.plotting.labels import axis_label
 from chaosgym.recordings.monitor import Monitor
 from chaosgym.simulation import simulate
 from chaosgym.units import as_float
+
+LOOKING = "other motions: looking for them ..."
+"""Told until the search has ended."""
+
+SEARCHED_SECONDS = 3e-3
+"""Processor time of a cycle [s] up to which the search of other motions, some 7,000 cycles, is made here."""
 
 BUDGET = 400
 """Cycles of the diagnosis: what is sure after some hundredths of a second."""
@@ -71,7 +78,7 @@ class PointView:
     nature
         Of the verdict; "undetermined" where the motion could not be followed.
     headline, lines
-        Verdict and its evidence; the classifier; the monitor. Other motions are looked for apart (``explore.beside``).
+        Verdict and its evidence; the classifier; the monitor. Other motions are looked for apart (``beside_of``).
     """
 
     time: Array
@@ -265,3 +272,26 @@ def orbit_diagram(machine: Machine, slider: Slider) -> Iterator[tuple[float, Arr
         except SimulationError:
             continue
         yield speed, np.unique(np.round(record.peak_force[:, record.worst_side], 3))
+
+
+def beside_of(machine: Machine) -> tuple[str, ...]:
+    """Other motions of a machine, how far was looked, and over which speeds each motion is stable.
+
+    Random starts, run-ups and run-downs are those of every command.
+
+    Examples
+    --------
+    >>> from chaosgym.explore.point import beside_of
+    >>> beside_of(chaosgym.ImpactBeam(excitation_frequency=10.0))[0][:64]
+    'other motions: 48 random starts up to 10 times the motion and ru'
+    """
+    try:
+        verdict = diagnose(machine, budget=BUDGET)
+        if verdict.nature != "periodic":
+            return ("other motions: looked for only beside a motion that repeats",)
+        check_cost(machine, SEARCHED_SECONDS)
+        beside = coexistence(machine, verdict, workers=1)
+    except (ParameterError, SimulationError) as error:
+        return (f"other motions: not looked for: {error}",)
+    told = beside.attractors.told_of(verdict).statement.other_motions
+    return (f"other motions: {told}", *beside.lines)

@@ -25,7 +25,7 @@ from chaosgym.plotting import response
 from chaosgym.plotting.branches import bifurcation_map, branches, shares
 from chaosgym.plotting.design import cost_against_life, peak_record, series_life, type_map_around
 from chaosgym.plotting.labels import axis_label, called
-from chaosgym.plotting.sketch import draw_machine
+from chaosgym.plotting.response import draw_machine
 from chaosgym.plotting.style import ACCENT, INK, MUTED, NATURE_COLOURS, STYLE, figure_of
 from chaosgym.recordings.measured_sweep import SweepTypes
 from chaosgym.recordings.run_up import RunUp

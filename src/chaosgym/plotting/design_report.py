@@ -29,7 +29,7 @@ from chaosgym.machines.parameters import Parameter, parameters_of, quantity_of
 from chaosgym.plotting import design as figures
 from chaosgym.plotting.labels import called
 from chaosgym.plotting.printed import print_page, printing_browser
-from chaosgym.plotting.sketch import draw_machine
+from chaosgym.plotting.response import draw_machine
 from chaosgym.plotting.style import STYLE, TYPE_COLOURS, figure_of
 from chaosgym.series.verdict import COEXISTING, TYPE_MEANINGS
 from chaosgym.version import __version__

@@ -16,10 +16,22 @@ from numpy.typing import ArrayLike, NDArray
 
 from chaosgym.arrays import Array
 from chaosgym.errors import DatasetError
+from chaosgym.machines import Machine
+from chaosgym.machines.picture import CALM, draw
 from chaosgym.plotting.labels import axis_label, called
 from chaosgym.plotting.style import ACCENT, INK, MUTED, NATURE_COLOURS, PALE, STYLE, TYPE_COLOURS, figure_of
 from chaosgym.recordings.measured_sweep import SweepTypes
+from chaosgym.simulation import simulate
 from chaosgym.sweeps import LabelledSweep, SweepPlan
+
+BEFORE, CYCLES, SAMPLES = 100, 4, 60
+"""Cycles in which the machine may settle, cycles that are drawn, and samples of each."""
+
+
+def draw_machine(machine: Machine, panel: Axes) -> None:
+    """Draw a machine at the start of a cycle, after it may have settled, with its gaps larger than they are."""
+    record = simulate(machine, CYCLES, transient=BEFORE, samples_per_cycle=SAMPLES)
+    draw(panel, record.of_joint(), CALM, 0.0, float(record.peak_force.max()) or 1.0)
 
 
 def curve(x: ArrayLike, y: ArrayLike, ax: Axes, *, label: str | None = None, color: str = ACCENT) -> Axes:
