@@ -112,8 +112,11 @@ class Machine(Abilities, ABC):
     scenes: ClassVar[Mapping[str, Mapping[str, Any]]] = {"as it is": {}}
     """Scenes whose cost the trade-off shows: the fields in which they differ from the default."""
 
-    stated_state: ClassVar[tuple[float, ...]] = ()
-    """Initial state that its file states, in SI units; rest in the middle of the gap if empty."""
+    initial_state: ClassVar[tuple[float, ...]] = ()
+    """State (n_states,) in SI units from which it runs where no other is given; rest in the middle of the gap if empty.
+
+    That of the class is what its file states; ``from_state`` gives a machine another.
+    """
 
     tolerances: ClassVar[Mapping[str, tuple[float, bool]]] = {}
     """Half width of each field within which machines are built, and whether it is a share; usual ones if empty."""
@@ -143,13 +146,6 @@ class Machine(Abilities, ABC):
         for each in fields(self):
             object.__setattr__(self, each.name, getattr(chosen, each.name))
 
-    @property
-    @final
-    def initial_state(self) -> tuple[float, ...]:
-        """State from which it runs where no other is given (n_states,), in SI units; empty for rest."""
-        own: tuple[float, ...] = self.__dict__.get("_initial_state", self.stated_state)
-        return own
-
     @final
     def begins_from(self) -> str:
         """Where it runs from unless told otherwise, in words: "rest" or "its initial state"."""
@@ -176,7 +172,7 @@ class Machine(Abilities, ABC):
                 f"initial_state has shape {values.shape}; allowed: ({self.n_states},), all values finite: "
                 "displacements, then velocities"
             )
-        return self._with_unchecked(_initial_state=tuple(values.tolist()))
+        return self._with_unchecked(initial_state=tuple(values.tolist()))
 
     @property
     @final

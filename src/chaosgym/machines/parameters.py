@@ -179,8 +179,8 @@ def with_settings(machine: M, settings: Mapping[str, Any]) -> M:
         if name not in known:
             raise ParameterError(f"{name_of(machine)} has no field {name!r}{suggestion(name, known)}")
     made = replace(machine, **settings)  # type: ignore[type-var]
-    if "_initial_state" in vars(machine):
-        object.__setattr__(made, "_initial_state", vars(machine)["_initial_state"])
+    if "initial_state" in vars(machine):
+        object.__setattr__(made, "initial_state", vars(machine)["initial_state"])
     return made if tolerance is None else model_within(made, tolerance).machine
 
 

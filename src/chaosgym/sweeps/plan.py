@@ -299,7 +299,7 @@ class SweepPlan:
             del described["definition"]
         described["machine"] = self.machine.name
         described["base"] = {name: getattr(self.machine, name) for name in parameters_of(self.machine)}
-        if self.machine.initial_state != self.machine.stated_state:
+        if self.machine.initial_state != type(self.machine).initial_state:
             described["initial_state"] = list(self.machine.initial_state)
         described["axes"] = [asdict(axis) for axis in self.axes]
         described["type_reach"] = self.type_reach()

@@ -273,7 +273,7 @@ def built(path: str, digest: str, data: Mapping[str, Any], _folder: Path) -> typ
     named = zip(("speed_range", "clearance_range"), fields, ends, strict=True)
     made.usual_ranges = {field: range_of(made, f"operation.{key}", field, given) for key, field, given in named}
     made.tolerances = tolerances_of(data["tolerances"], machine)
-    made.stated_state = state_of(operation, machine)
+    made.initial_state = state_of(operation, machine)
     made.task_defaults = TaskDefaults(task=data["job"])
     if motor is not None:
         _ = machine.crank  # what can't turn is refused here

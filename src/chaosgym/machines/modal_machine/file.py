@@ -143,7 +143,7 @@ def built(path: str, digest: str, data: Mapping[str, Any], folder: Path) -> type
     made.tolerances = tolerances_of(data["tolerances"], made())
     if "initial_state" in operation:
         start = start_of(operation["initial_state"], data["coordinates"], structure)
-        made.stated_state = made().from_state(start).initial_state
+        made.initial_state = made().from_state(start).initial_state
     made.task_defaults = TaskDefaults(task={**made.task_defaults.task, **data["job"]})
     kind: type[Machine] = made
     return kind
