@@ -39,6 +39,13 @@ def following():
     return play(Follow(), BEAM, MACHINES)
 
 
+def test_a_map_is_of_one_machine_however_soon_its_joint_fractures():
+    """A job that ends gives its place to another machine, which would be measured at the speeds that are left."""
+    usual, brittle = (maps_of(BEAM, machines=range(2), reference_damage=each) for each in (0.5, 100.0))
+    np.testing.assert_array_equal(brittle.share, usual.share)
+    np.testing.assert_array_equal(brittle.mean_peak, usual.mean_peak)
+
+
 def test_following_is_at_the_demand(following):
     """But for the steps after a change."""
     assert np.mean(following.speed == following.demand) > 0.95

@@ -74,7 +74,9 @@ def maps_of(
     grid, cycles = task.grid, task.cycles_per_step
     settling, judged = -(-SETTLING_CYCLES // cycles), -(-JUDGED_CYCLES // cycles)
     span = task.highest_speed - task.lowest_speed
-    sweep = {"action": "speed", "steps": len(grid) * (settling + judged), "slew_limit": span, "wear": 0.0}
+    steps = len(grid) * (settling + judged)
+    # without damage, since a joint that fractured would give its place to another machine
+    sweep = {"action": "speed", "steps": steps, "slew_limit": span, "wear": 0.0, "reference_damage": 0.0}
     envs = native_envs(env, count, **(keywords | sweep))
     options = {"speed": float(grid[0])} | ({} if machines is None else {"machine": np.asarray(machines)})
     envs.reset(seed=list(seeds if seeds is not None else range(count)), options=options)
