@@ -84,3 +84,11 @@ def test_the_time_limit_wrapper_truncates() -> None:
 def test_entry_points_are_strings() -> None:
     """Strings are what a spawned worker can load."""
     assert all(isinstance(gym.spec(name).entry_point, str) for name in chaosgym.envs.ENVIRONMENTS)
+
+
+def test_what_needs_stable_baselines3_says_what_to_install(monkeypatch: pytest.MonkeyPatch) -> None:
+    """It is an extra, and who reads Gymnasium's pages may not have it."""
+    monkeypatch.setitem(sys.modules, "stable_baselines3", None)
+    monkeypatch.delitem(sys.modules, "chaosgym.envs.sb3", raising=False)
+    with pytest.raises(ImportError, match=r"SB3VecEnv needs stable-baselines3: pip install '\.\[learn\]'"):
+        _ = chaosgym.envs.SB3VecEnv

@@ -29,7 +29,14 @@ _LATER = {"SB3VecEnv": "chaosgym.envs.sb3", "VisitedSpeeds": "chaosgym.envs.memo
 
 def __getattr__(name: str) -> Any:
     if name in _LATER:
-        return getattr(import_module(_LATER[name]), name)
+        try:
+            return getattr(import_module(_LATER[name]), name)
+        except ModuleNotFoundError as error:
+            if (error.name or "").partition(".")[0] != "stable_baselines3":
+                raise
+            raise ImportError(
+                f"{name} needs stable-baselines3: pip install '.[learn]' in a clone of chaosgym"
+            ) from None
     raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
 
 
