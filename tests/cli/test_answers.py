@@ -72,7 +72,8 @@ QUICK = {
     "dataset-map": "map --out map2.png",
     "design": "--template impact-beam",
     "tradeoff": "impact-beam --frequency-hz 19 --step-check",
-    "run-agent": f"{BEAM} --machine 13 --load-rating 500; {BEAM} --machine 13; {BEAM} --plant docs.examples.rig:Rig",
+    "run-agent": f"{BEAM} --machine 13 --load-rating 500; {BEAM} --machine 13; {BEAM} --plant docs.examples.rig:Rig"
+    "; chaosgym/AnyMachine-v0",
     "info": "",
 }
 """Arguments of each command; several forms are divided by a semicolon, and run in this order in one folder."""

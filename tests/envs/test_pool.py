@@ -130,6 +130,18 @@ def test_a_picture_of_a_job_names_the_units_of_what_is_felt():
     plt.close("all")
 
 
+def test_a_job_in_the_terminal_names_the_unit_of_what_is_felt():
+    """A mean peak of 0.8 is a share of the rated force, in the table and as JSON."""
+    done = CliRunner().invoke(app, ["run-agent", ANY, "--machine", "3"])
+    assert done.exit_code == 0, done.output
+    lines = done.stdout.splitlines()
+    assert "mean peak [of the rated one]  Type III" in lines[0]
+    assert "[job] in the file" not in done.stdout
+    told = json.loads(CliRunner().invoke(app, ["run-agent", ANY, "--machine", "3", "--json"]).stdout)
+    assert "mean_peak_force_N" not in told
+    assert told["mean_peak_force_share"][10] == pytest.approx(float(lines[2].split()[3]), abs=6e-4)
+
+
 def test_other_machines_are_compared_by_command(tmp_path):
     """``chaosgym compare --split`` plays the kinds on which nothing was tuned; a split that is not there is named."""
     given = ["compare", ANY, "--machines", "2", "--only", "follow the demand", "--out", str(tmp_path / "any.parquet")]

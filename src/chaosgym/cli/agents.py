@@ -26,11 +26,14 @@ KRIGING = "kriging"
 
 LIFE = "life of the joint"
 
-NO_POLICY = (
-    "no policy is shipped for this machine, so kriging played for the joint's life; returns are by reference_force, "
-    "100 N if [job] in the file says nothing; forces and the ratio of lives do not depend on it"
-)
+NO_POLICY = "no policy is shipped for this machine, so kriging played for the joint's life"
 """What is said where no agent is given."""
+
+OF_A_FILE = (
+    "; returns are by reference_force, 100 N if [job] in the file says nothing; forces and the ratio of lives do not "
+    "depend on it"
+)
+"""What is added of the file of a machine."""
 
 
 @click.command()
@@ -315,13 +318,17 @@ def _picture(plot: str | None, env: str) -> Path | None:
 
 
 def _job_lines(name: str, job: "Played", follow: "Played", load_rating: float | None, out: Path | None) -> list[str]:
+    from gymnasium.envs.registration import registry
+
     from chaosgym.design.texts import hours_text
 
     about = job.as_dict()
-    lines = [f"{'step':>5s} {'demand':>8s} {'speed [' + job.unit + ']':>12s} {'mean peak [N]':>14s}  Type III"]
+    felt, force = job.column("mean_peak_force")[:, 0], f"mean peak [{job.felt_unit}]".rjust(14)
+    digits = 1 if job.felt_unit == "N" else 3
+    lines = [f"{'step':>5s} {'demand':>8s} {'speed [' + job.unit + ']':>12s} {force}  Type III"]
     for step in range(0, len(about["speed"]), 10):
-        demand, speed, peak = about["demand"][step], about["speed"][step], about["mean_peak_force_N"][step]
-        lines.append(f"{step + 1:5d} {demand:8.2f} {speed:12.2f} {peak:14.1f} {about['type_iii'][step]:9.0%}")
+        demand, speed, irregular = about["demand"][step], about["speed"][step], about["type_iii"][step]
+        lines.append(f"{step + 1:5d} {demand:8.2f} {speed:12.2f} {felt[step]:{len(force)}.{digits}f} {irregular:9.0%}")
     for who, played in ((name, about), ("following the demand", follow.as_dict())):
         lines.append(
             f"{who}: {played['status'].replace('_', ' ')}, return {played['return']:.2f}, Type III in "
@@ -329,7 +336,7 @@ def _job_lines(name: str, job: "Played", follow: "Played", load_rating: float | 
             f"largest force {played['largest_force_N']:.1f} N"
         )
     if name == KRIGING:
-        lines.append(NO_POLICY)
+        lines.append(NO_POLICY + OF_A_FILE * (job.env not in registry))
     if job.damage[0] > 0.0:
         forces = [float(one.equivalent_force[0]) for one in (job, follow)]
         lines.append(f"equivalent force: {forces[0]:.1f} N, {forces[1]:.1f} N under following the demand")

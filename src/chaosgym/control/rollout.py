@@ -127,7 +127,8 @@ class Played:
         return np.asarray(self.felt[:, :, FELT.index(name)])
 
     def as_dict(self) -> dict[str, Any]:
-        """What became of the first job, as plain numbers."""
+        """What became of the first job, as plain numbers; measured forces in their unit."""
+        peak = "mean_peak_force_share" if self.unit == SHARE else "mean_peak_force_N"
         return {
             "env": self.env,
             "machine": int(self.machines[0]),
@@ -144,7 +145,7 @@ class Played:
             "speed": _plain(self.speed),
             "demand": _plain(self.demand),
             "type_iii": _plain(self.type_iii),
-            "mean_peak_force_N": _plain(self.column("mean_peak_force")),
+            peak: _plain(self.column("mean_peak_force")),
         }
 
 
