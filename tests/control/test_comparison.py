@@ -129,6 +129,8 @@ def test_an_unknown_controller_is_named(tmp_path):
     """Together with those that there are."""
     with pytest.raises(ParameterError, match="no controller 'nobody'; known: follow the demand"):
         compare(BEAM, tmp_path / "x.parquet", machines=2, only=["nobody"])
+    with pytest.raises(ParameterError, match="no controller 'kriginng'; did you mean kriging"):
+        compare(BEAM, tmp_path / "x.parquet", machines=2, only=["kriginng"])
 
 
 def test_evaluation_takes_whatever_acts():

@@ -92,7 +92,10 @@ def test_kriging_plays_where_no_policy_is_shipped(tmp_path):
 @pytest.mark.parametrize(
     ("arguments", "complaint"),
     [
-        (("chaosgym/ImpactBeam-v0",), "env = 'chaosgym/ImpactBeam-v0' is unknown; known: chaosgym/ImpactBeam-v1"),
+        (
+            ("chaosgym/ImpactBeam-v0",),
+            "env = 'chaosgym/ImpactBeam-v0' is unknown; did you mean chaosgym/ImpactBeam-v1?",
+        ),
         (("chaosgym/Machine-v0", "--policy", "{folder}"), "machine = '' does not exist"),
         (("CartPole-v1",), "is unknown"),
         (("gone.toml", "--policy", "{folder}"), "gone.toml can't be read"),

@@ -29,7 +29,7 @@ from chaosgym.control.scores import ONE, SAFE, ZERO
 from chaosgym.envs.pool import Pool
 from chaosgym.envs.task import Status
 from chaosgym.envs.vector_env import native_envs
-from chaosgym.errors import DatasetError, ParameterError
+from chaosgym.errors import DatasetError, ParameterError, nearest_or
 from chaosgym.files import write_atomically
 from chaosgym.numbers import whole
 from chaosgym.parquet import parquet_of
@@ -183,7 +183,8 @@ def compare(
     chosen = known_names if only is None else list(only)
     for name in chosen:
         if name not in known_names:
-            raise ParameterError(f"there is no controller {name!r}; known: {', '.join(known_names)}")
+            listed = f"known: {'; '.join(known_names)}"
+            raise ParameterError(f"there is no controller {name!r}; {nearest_or(listed, name, known_names)}")
     known = native_envs(env, **keywords)
     kind = known.nominal
     subject = subject_of(env if kind.definition == kind.name else f"{env} ({kind.definition})", **keywords)

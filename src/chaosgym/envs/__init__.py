@@ -9,7 +9,7 @@ from typing import Any
 
 from gymnasium.envs.registration import EnvSpec, register, registry
 
-from chaosgym.errors import ParameterError
+from chaosgym.errors import ParameterError, nearest_or
 from chaosgym.machines import FILE_ENDING, MACHINES
 
 TASKS: dict[str, dict[str, Any]] = {
@@ -78,7 +78,8 @@ def environment(env: str) -> EnvSpec:
     if found is None or found.entry_point != _ENTRY_POINT:
         ours = {name: spec for name, spec in registry.items() if spec.entry_point == _ENTRY_POINT}
         known = [name for name, spec in ours.items() if "machine" in spec.kwargs]
-        raise ParameterError(f"env = {env!r} is unknown; known: {', '.join(known)}, or a file my-machine.toml")
+        listed = f"known: {', '.join(known)}, or a file my-machine.toml"
+        raise ParameterError(f"env = {env!r} is unknown; {nearest_or(listed, env, known)}")
     return found
 
 
