@@ -382,3 +382,54 @@ def test_a_response_that_settles_did_not_leave_its_pattern():
         dying = 30.0 * generator.uniform(0.75, 0.9) ** k * np.cos(generator.uniform(0.0, np.pi) * k)
         verdict = judge_peaks(100.0 + dying + generator.uniform(-0.4, 0.4, 200), sensor_error=0.4).diagnosis
         assert "leave its pattern" not in verdict.condition
+
+
+@pytest.mark.parametrize("stated", [{"sensor_error": 0.05}, {"sensor_sigma": 0.02}, {}])
+@pytest.mark.parametrize("coarse", ["sampled", "rounded"])
+def test_the_step_of_the_readings_is_no_sensor_error(coarse, stated):
+    """Chaos of 0.4 N under a step of 1 N is never periodic without a condition, whatever error is stated."""
+    chaos = logistic(3.9, 400)
+    peaks = 100.0 + 0.4 * (chaos - chaos.mean()) / chaos.std()
+    readings, step = (peaks, 0.5) if coarse == "sampled" else (np.round(peaks + 0.2), 0.0)
+    found = judge_peaks(readings, resolution=step, **stated).diagnosis
+    assert found.nature != "periodic" or found.condition
+
+
+def test_a_step_beyond_the_stated_error_is_a_condition():
+    """Noise of 0.4 N is periodic within a stated 0.4 N; beside 0.1 N a step of 0.5 N explains it under a condition."""
+    peaks = 100.0 + np.random.default_rng(3).uniform(-0.4, 0.4, 400)
+    assert judge_peaks(peaks, sensor_error=0.4, resolution=0.5).diagnosis.condition == ""
+    found = judge_peaks(peaks, sensor_error=0.1, resolution=0.5).diagnosis
+    assert found.words == "periodic, period 1, if the step of the readings adds 0.5 N to the stated 0.1 N"
+    assert "random" in judge_peaks(peaks, resolution=0.5).diagnosis.condition
+
+
+def laminar(start, cycles):
+    """Type-I intermittency (Pomeau and Manneville 1980) at r = 3.8284, 20 N wide, from a start on."""
+    x, found = start, np.empty(cycles)
+    for cycle in range(cycles):
+        x = 3.8284 * x * (1.0 - x)
+        found[cycle] = 90.0 + 20.0 * x
+    return found
+
+
+@pytest.mark.parametrize("stated", [{"sensor_error": 0.4}, {"sensor_sigma": 0.25}, {}])
+def test_a_pattern_after_a_burst_is_periodic_under_a_condition_only(stated):
+    """Wherever a record of 100 or 300 cycles begins amid bursts, its laminar phases are no certain period three."""
+    rng, bursts = np.random.default_rng(12), 0
+    for cycles in (100, 300):
+        for _ in range(8):
+            series = laminar(rng.uniform(0.2, 0.9), 400 + cycles)[-cycles:]
+            found = judge_peaks(series + rng.uniform(-0.4, 0.4, cycles), **stated).diagnosis
+            burst = np.abs(series[3:] - series[:-3]).max() > 2.5
+            bursts += burst
+            assert not burst or found.nature != "periodic" or found.condition
+    assert bursts >= 8
+
+
+def test_a_response_that_nears_its_pattern_has_settled():
+    """A deviation of 20 N that falls by a fifth a cycle is a way to period two, and asks for no condition."""
+    time = np.arange(200)
+    peaks = 100.0 + 5.0 * (-1.0) ** time + 20.0 * 0.8**time
+    noise = np.random.default_rng(5).uniform(-0.4, 0.4, 200)
+    assert judge_peaks(peaks + noise, sensor_error=0.4).diagnosis.words == "periodic, period 2"

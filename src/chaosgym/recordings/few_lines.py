@@ -104,7 +104,7 @@ def _torus(found: Scatter, most: float, told: SensorError | None) -> MeasuredVer
     if left_by_hum(found.readings) < LINES_REST * sigma:
         return None
     reason = f"does not repeat; {lines} lines of the spectrum leave {newton(sigma)}, no more than the sensor's error"
-    evidence = {"cycles": size, **found.evidence(), "spectral_lines": lines}
+    evidence = {"cycles": size, **found.evidence(), "spectral_lines": lines, "lines_rest": sigma}
     diagnosis = Diagnosis(
         nature="quasiperiodic", margin=1.0 - sigma / most, reason=reason, horizon=size, evidence=evidence
     )
@@ -127,7 +127,7 @@ def _two_lines(found: Scatter, most: float, told: SensorError | None) -> Measure
         margin=1.0 - sigma / most,
         reason=f"two lines of the spectrum leave {newton(sigma)} (standard deviation), at random",
         horizon=size,
-        evidence={"cycles": size, **found.evidence(), "spectral_lines": FEW_LINES},
+        evidence={"cycles": size, **found.evidence(), "spectral_lines": FEW_LINES, "lines_rest": sigma},
         condition=f"if its two lines in {size} cycles are the machine's own",
         tells_more=("more cycles",),
     )

@@ -41,8 +41,9 @@ LARGEST_FORCE, SMALLEST_FORCE = 1e9, 1e-100
 MOST_PARTS = 3
 """How often a record is cut in two."""
 
-SEEN_AGAIN, FEWEST_AGAIN, FAR = 3, 8, 3.0
-"""Periods, and readings, on a pattern after which it is left, not passed by; and how many widths away that is."""
+SEEN_AGAIN, FEWEST_AGAIN, FAR, FEWEST_SPANS = 3, 8, 3.0, 5
+"""Periods, and readings, on a pattern after which it is left, not passed by; how many widths away that is; and spans of
+cycles over which a response must come nearer to settle: irregular ones do so by chance once in 120."""
 
 LITTLE = 0.3
 """Share of its standard deviation that a motion leaves which holds over a change."""
@@ -160,7 +161,8 @@ def judge_peaks(
         line = None
     if line is not None and is_sampling_beat(line, len(whole), sampled):
         verdict = _of_sampling(verdict, line)
-    if told is not None and _left_its_pattern(whole, verdict.diagnosis, 2.0 * told.half_width):
+    near = 2.0 * (resolved if told is None else max(told.half_width, resolved))
+    if near and _may_leave_its_pattern(whole, verdict.diagnosis, near):
         left = (verdict.diagnosis.settle_cycle or 0) + 1
         verdict = _under(verdict, f"if it does not leave its pattern again, as before cycle {left}")
     heights = readings[np.array(outliers, int) - 1] - np.median(readings)
@@ -241,10 +243,11 @@ def _apart_from(verdict: MeasuredVerdict, condition: str) -> MeasuredVerdict:
     return replace(_under(verdict, condition), random=random)
 
 
-def _left_its_pattern(readings: Array, found: Diagnosis, near: float) -> bool:
-    """Whether a response that repeats at the end was on the same pattern before, and left it: so do laminar phases.
+def _may_leave_its_pattern(readings: Array, found: Diagnosis, near: float) -> bool:
+    """Whether a response that repeats at the end was irregular before, or on the same pattern: so are laminar phases.
 
-    A response that settles comes near its pattern once. ``near`` [N] is how close readings of one pattern are.
+    A response that settles comes near its pattern once, and ever nearer. ``near`` [N] is how close readings of one
+    pattern are.
     """
     period, settled = found.period, found.settle_cycle
     if found.nature != "periodic" or period is None or not settled:
@@ -256,7 +259,16 @@ def _left_its_pattern(readings: Array, found: Diagnosis, near: float) -> bool:
         quiet = np.flatnonzero(np.convolve(off <= near, np.ones(least), "valid") == least)
         if len(quiet) and np.max(off[quiet[0] + least :], initial=0.0) > FAR * near:
             return True
-    return False
+    away = np.abs(readings[:settled] - pattern[(np.arange(settled) - settled) % period])
+    far = np.flatnonzero(away > near)
+    return len(far) > 0 and not any(_nears(away[: far[-1] + 1], near, period * k) for k in (1, 2, 4))
+
+
+def _nears(away: Array, near: float, span: int) -> bool:
+    """Whether distances from a pattern (cycles,) sink from each span of cycles to the next, five at least, by half."""
+    largest = [float(np.max(away[max(0, end - span) : end])) for end in range(len(away), 0, -span)]
+    sinks = bool(np.all(np.diff(largest) > -near)) and largest[0] < 0.5 * largest[-1]
+    return sinks and len(largest) >= FEWEST_SPANS
 
 
 def _accounts_for(verdict: MeasuredVerdict, readings: Array) -> bool:
@@ -294,6 +306,10 @@ def _joined(verdicts: list[MeasuredVerdict], cycles: list[int]) -> MeasuredVerdi
     decisive = next((v for v in irregular if v in [*before, last]), last)
     if not irregular and "undetermined" in natures:
         decisive = verdicts[natures.index("undetermined")]
+    if decisive.diagnosis.nature != "chaotic":  # what each part rests on, all rest on
+        for verdict in before[::-1]:
+            if verdict.diagnosis.condition not in decisive.diagnosis.condition:
+                decisive = _under(decisive, verdict.diagnosis.condition)
     return replace(decisive, diagnosis=replace(decisive.diagnosis, reason=told, horizon=horizon))
 
 

@@ -45,6 +45,9 @@ NOISE_SHARE = 0.5
 FEW_CYCLES, MORE_CYCLES = 200, 1000
 """Cycles below which more of them would tell more of scatter that looks random, and of a map that is not sure."""
 
+FINER = ("readings in finer steps or a faster sampling",)
+"""What tells more where the step of the readings hides what they do."""
+
 APART_FROM_NOISE = ("a second sensor", "the machine's model")
 """What tells noise of the process from chaos."""
 
@@ -61,18 +64,19 @@ def judge_scatter(found: Scatter, told: SensorError | None, resolved: float) -> 
 
 
 def _judge(found: Scatter, told: SensorError | None, resolved: float) -> MeasuredVerdict:
-    if np.max(np.abs(found.residual)) <= 2.0 * resolved:
-        step = told or SensorError(resolved, resolved / math.sqrt(3.0), "estimated")
-        return _periodic(found, f"within {newton(2.0 * resolved)}, the step of the record", step)
+    if not np.any(found.residual):
+        exact = told or SensorError(resolved, resolved / math.sqrt(3.0), "estimated")
+        return _periodic(found, f"within {newton(resolved)}, half the step of the record", exact)
     most = None if told is None else _most(found, told, resolved)
     line = None if found.random and found.period == 1 else line_of(found.level)
     if line is not None and better(line, found):
         several = torus_of(found, told, most, resolved) if len(found.readings) >= QUASIPERIODIC_CYCLES else None
-        return several or on_line(found, line, told, most)
-    if most is not None and found.sigma <= most:
-        assert told is not None
+        return _resolved(several, found, told, resolved) or on_line(found, line, told, most)
+    if told is not None and most is not None and found.sigma <= most:
         return _within_error(found, told, resolved)
-    torus = torus_of(found, told, most, resolved)
+    if np.max(np.abs(found.residual)) <= 2.0 * resolved:
+        return _within_step(found, told, resolved)
+    torus = _resolved(torus_of(found, told, most, resolved), found, told, resolved)
     if torus is not None:
         return torus
     if len(found.readings) < CHAOTIC_CYCLES:
@@ -97,20 +101,34 @@ def _most(found: Scatter, told: SensorError, resolved: float) -> float:
 
 
 def _stated(told: SensorError, resolved: float) -> str:
-    """The sensor's error, and beside it what a peak is resolved to where that counts."""
+    """The sensor's error, and beside it what a reading is resolved to where that counts."""
     own = newton(told.half_width)
     if resolved <= 0.01 * told.half_width:
         return own
-    return f"{own}, and the {newton(resolved)} to which peaks are resolved"
+    return f"{own}, and the {newton(resolved)} to which readings are resolved"
+
+
+def _resolved(
+    verdict: MeasuredVerdict | None, found: Scatter, told: SensorError | None, resolved: float
+) -> MeasuredVerdict | None:
+    """The verdict on a torus; under a condition where its lines leave more than the stated error alone."""
+    if verdict is None or told is None or verdict.diagnosis.evidence["lines_rest"] <= _most(found, told, 0.0):
+        return verdict
+    condition = " and ".join(filter(None, (verdict.diagnosis.condition, _if_resolved(told, resolved))))
+    return replace(verdict, diagnosis=replace(verdict.diagnosis, condition=condition))
+
+
+def _if_resolved(told: SensorError, resolved: float) -> str:
+    """The condition that what exceeds the stated error comes of the step of the readings."""
+    return f"if the step of the readings adds {newton(resolved)} to the stated {newton(told.half_width)}"
 
 
 def _within_error(found: Scatter, told: SensorError, resolved: float) -> MeasuredVerdict:
-    """Verdict on scatter that may be all the sensor's."""
+    """Verdict on scatter that may be all the sensor's, or the step's by which its readings are resolved."""
     sigma, half_width = math.hypot(told.sigma, resolved), told.half_width + resolved
     if not found.random:
-        fitted = determinism(found.readings) if len(found.readings) >= CHAOTIC_CYCLES else None
         reason = f"can't tell: varies within the sensor's error of {_stated(told, resolved)}, but not at random"
-        return (_random(found, fitted, told) if fitted else None) or _open(found, reason, told)
+        return _correlated(found, told, reason)
     if found.relative > LARGE_SCATTER or (found.sigma < 0.4 * sigma and found.relative > SMALL_SCATTER):
         spread = 0.5 * float(np.ptp(found.readings))
         reason = f"can't tell: the sensor's error of {_stated(told, resolved)} hides a spread of +-{newton(spread)}"
@@ -118,24 +136,41 @@ def _within_error(found: Scatter, told: SensorError, resolved: float) -> Measure
     if found.may_be_hum:
         reason = f"can't tell: repeats every {found.period} cycles, or a line of the spectrum (a hum) lies on less"
         return _open(found, reason, told)
-    furthest = np.abs(around_middle(found.readings, found.period))
-    slack = 2.0 * math.sqrt(found.period / len(found.readings)) if found.growth or found.drift else 0.0
-    outside = (
-        float(np.mean(np.abs(found.residual) > half_width)) if furthest.max() > (WITHIN + slack) * half_width else 0.0
-    )
-    condition = ""
-    if told.source == "stated sigma":
+    furthest = float(np.abs(around_middle(found.readings, found.period)).max())
+    slack = WITHIN + (2.0 * math.sqrt(found.period / len(found.readings)) if found.growth or found.drift else 0.0)
+    normal = told.source == "stated sigma"
+    own = found.sigma <= _most(found, told, 0.0) and (normal or furthest <= slack * told.half_width)
+    condition = "" if own else _if_resolved(told, resolved)
+    if normal:
         shown = f"with a standard deviation of {newton(found.sigma)}; stated: {newton(told.sigma)}"
-    elif outside:
+    elif furthest > slack * half_width:
+        outside = float(np.mean(np.abs(found.residual) > half_width))
         shown = (
             f"with a standard deviation of {newton(found.sigma)}; {100.0 * outside:.2g} % of the readings lie outside "
-            f"the stated +-{newton(half_width)}, the farthest by {newton(float(furthest.max()))}"
+            f"the stated +-{_stated(told, resolved)}, the farthest by {newton(furthest)}"
         )
-        condition = f"if the sensor errs by more than the stated {newton(half_width)}"
+        condition = f"if the sensor errs by more than the stated {newton(told.half_width)}" if outside else condition
     else:
-        shown = f"within {newton(float(np.max(np.abs(found.residual))))}; stated: {newton(half_width)}"
+        shown = f"within {newton(float(np.max(np.abs(found.residual))))}; stated: {_stated(told, resolved)}"
     verdict = _periodic(found, shown, told)
     return replace(verdict, diagnosis=replace(verdict.diagnosis, condition=condition))
+
+
+def _within_step(found: Scatter, told: SensorError | None, resolved: float) -> MeasuredVerdict:
+    """Verdict on scatter within the step by which readings are resolved: it is no chaos only if it is random."""
+    within = f"within {newton(2.0 * resolved)}, the step of the record"
+    if not found.random:
+        return _correlated(found, told, f"can't tell: varies {within}, but not at random", FINER)
+    step = told or SensorError(resolved, resolved / math.sqrt(3.0), "estimated")
+    return _if_random(_periodic(found, within, step, random=True), found, FINER)
+
+
+def _correlated(
+    found: Scatter, told: SensorError | None, reason: str, tells_more: Sequence[str] = ()
+) -> MeasuredVerdict:
+    """Periodic if its correlated scatter is random, else undetermined: what may be the sensor's is not called chaos."""
+    fitted = determinism(found.readings) if len(found.readings) >= CHAOTIC_CYCLES else None
+    return (_random(found, fitted, told) if fitted else None) or _open(found, reason, told, tells_more)
 
 
 def around_middle(values: Array, period: int) -> Array:
@@ -212,10 +247,10 @@ def _resting(found: Scatter, fitted: Determinism, told: SensorError | None) -> M
     return verdict
 
 
-def _if_random(verdict: MeasuredVerdict, found: Scatter) -> MeasuredVerdict:
+def _if_random(verdict: MeasuredVerdict, found: Scatter, asked: tuple[str, ...] = ()) -> MeasuredVerdict:
     """A periodic verdict under the condition that its scatter is no chaos, which a single record can't prove."""
     condition = f"if its scatter of {100.0 * found.relative:.2g} % is random"
-    asked = (
+    asked = asked or (
         APART_FROM_NOISE
         if verdict.error is not None and verdict.error.source != "estimated"
         else ("the sensor's error",)
