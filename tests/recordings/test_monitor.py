@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from chaosgym.errors import ChaosgymError, DiagnosisError
-from chaosgym.recordings.monitor import DEAD, LAGS, LONGEST, EventLog, Monitor, RepeatSums
+from chaosgym.recordings.monitor import DEAD, JUDGED, LAGS, LONGEST, EventLog, Monitor, RepeatSums
 from tests.classifier.made_up import settled
 
 ERROR = 1.0
@@ -110,7 +110,7 @@ def test_the_scatter_of_the_process_is_no_alarm_whatever_is_stated(kind, stated)
     for seed in range(4):
         rng = np.random.default_rng(seed)
         peaks = 100.0 + SCATTERS[kind](rng, 1000) + rng.uniform(-0.4, 0.4, 1000)
-        assert "alarm" not in [seen.event for seen in Monitor(stated).watch(np.maximum(peaks, 0.0))]
+        assert {seen.event for seen in Monitor(stated).watch(np.maximum(peaks, 0.0))} <= {"", "change"}
 
 
 @pytest.mark.parametrize(("noise", "size", "within"), [(0.0, 1.0, 30), (1.0, 5.0, 60)])
@@ -123,6 +123,66 @@ def test_chaos_that_begins_is_new(noise, size, within):
         peaks[200:] += size * (chaos - chaos.mean()) / chaos.std()
         alarms = [seen.cycle for seen in Monitor(0.4).watch(peaks) if seen.event == "alarm"]
         assert 200 < alarms[0] <= 200 + within
+
+
+def test_chaos_from_the_first_reading_is_told_without_a_stated_error():
+    """Chaos of 3 %, no error stated: the first 128 cycles are called irregular, and the alarm goes on within 20."""
+    for rate in (3.7, 3.78, 3.9, 3.98):
+        rng = np.random.default_rng([21, int(100 * rate)])
+        chaos = settled(rate, 200)
+        peaks = 100.0 + 3.0 * (chaos - chaos.mean()) / chaos.std() + rng.uniform(-0.4, 0.4, 200)
+        told = [(seen.event, seen.cycle) for seen in Monitor().watch(peaks) if seen.event not in ("", "change")]
+        assert [event for event, _ in told[:2]] == ["irregular from the start", "alarm"]
+        assert told[0][1] in JUDGED
+        assert told[1][1] <= told[0][1] + 20
+
+
+@pytest.mark.slow
+def test_of_chaos_from_the_start_most_is_told_and_of_noise_none():
+    """Ten records each: of chaos of four sizes three quarters are told, of noise of six kinds none."""
+
+    def told(made, seed):
+        peaks = np.maximum(100.0 + made + np.random.default_rng([23, seed]).uniform(-0.4, 0.4, 140), 0.0)
+        return "irregular from the start" in [seen.event for seen in Monitor().watch(peaks)]
+
+    def chaos(rate, seed):
+        found = settled(rate, 300)[11 * seed :][:140]
+        return (found - found.mean()) / found.std()
+
+    def correlated(rng, step):
+        found = [0.0]
+        for _ in range(239):
+            found.append(step(found[-1]) + 1.2 * rng.normal())
+        return np.array(found[100:]) / np.std(found[100:])
+
+    of_noise = SCATTERS | {
+        "AR(0.9) 1 %": lambda rng, n: correlated(rng, lambda x: 0.9 * x),
+        "threshold AR 1 %": lambda rng, n: correlated(rng, lambda x: 0.5 * x + (1.5 if x > 0.0 else -1.5)),
+    }
+    of_chaos = {
+        "1 %": lambda seed: chaos(3.9, seed),
+        "3 %": lambda seed: 3.0 * chaos(3.7, seed),
+        "5 %": lambda seed: 5.0 * chaos(4.0, seed),
+        "5 %, pink 1 %": lambda seed: 5.0 * chaos(3.9, seed) + pink(np.random.default_rng([24, seed]), 140),
+    }
+    found = {kind: sum(told(made(seed), seed) for seed in range(10)) for kind, made in of_chaos.items()}
+    false = {
+        kind: sum(told(made(np.random.default_rng([25, seed]), 140), seed) for seed in range(10))
+        for kind, made in of_noise.items()
+    }
+    print(found, false)
+    assert sum(false.values()) == 0
+    assert sum(found.values()) >= 30
+
+
+def test_it_is_all_clear_where_chaos_from_the_start_ends():
+    """Chaos of 3 % for 150 cycles, then one level: an alarm, and the all-clear within two dozen cycles."""
+    chaos = settled(3.9, 150)
+    peaks = np.concatenate([100.0 + 3.0 * (chaos - chaos.mean()) / chaos.std(), np.full(100, 100.0)])
+    peaks += np.random.default_rng(22).uniform(-0.4, 0.4, 250)
+    kinds = [(seen.event, seen.cycle) for seen in Monitor().watch(peaks) if seen.event not in ("", "change")]
+    assert [kind for kind, _ in kinds] == ["irregular from the start", "alarm", "all clear"]
+    assert 150 < kinds[-1][1] <= 174
 
 
 @pytest.mark.parametrize("kind", ["pink, learned", "normal, learned", "sensor 1.5 times worse", "periods 9, 12 and 16"])

@@ -8,7 +8,9 @@ Two readings of a repeating response differ by 2e at the most, and by a third of
 period stays near zero; of an irregular response all sums grow. The alarm goes on where the least of them exceeds LIMIT,
 and off where it has sunk below a third of that. The first 64 cycles tell how much the process scatters, whatever error
 is stated, so that the alarm tells of what is new. What the last readings forecast better than a line is no scatter:
-chaos from the start on raises the alarm where an error is stated.
+chaos from the start on raises the alarm where an error is stated. The first 64, 96 and 128 cycles are judged as
+``judge_peaks`` does, too: where they are chaotic the event "irregular from the start" says so, and what their map
+leaves is the error from there on.
 """
 
 import math
@@ -28,7 +30,7 @@ from chaosgym.plain import Result
 from chaosgym.series.noise import predictability
 from chaosgym.series.stroboscopic import irregularity
 
-Event = Literal["", "change", "alarm", "all clear", "dead sensor", "missing"]
+Event = Literal["", "change", "alarm", "all clear", "irregular from the start", "dead sensor", "missing"]
 
 LAGS, LONGEST = 8, 16
 """Longest period that counts as repeating, and that of ``chaosgym monitor``."""
@@ -48,6 +50,12 @@ NO_REPEAT = 1.1
 LEARNED, TRIED, QUIET = 64, 32, 1.5
 """First cycles by which the scatter is learned, those after which a stated error may be trusted, and how many times it
 the scatter then is at most."""
+
+JUDGED = (64, 96, 128)
+"""First cycles that are judged for chaos from the start on."""
+
+OF_MAP, OF_SCATTER = 2.0, 0.5
+"""Largest error in standard deviations that a chaotic map leaves, and its largest share of those of the readings."""
 
 FORECAST, LINEAR, ASKED = 4.0, 3, 24
 """Predictability of what a linear forecast from three readings leaves above which motion is deterministic, and readings
@@ -128,8 +136,9 @@ class Watch(Result):
     amplitude
         By how much the peaks since the last change do not repeat [N], the sensor's error included; None at first.
     event
-        "change" of the regime, "alarm" or "all clear" in this cycle, "dead sensor" where readings no longer
-        differ, "missing" for a cycle without a reading; empty otherwise.
+        "change" of the regime, "alarm" or "all clear" in this cycle, "irregular from the start" where the first cycles
+        are chaotic, "dead sensor" where readings no longer differ, "missing" for a cycle without a reading; empty
+        otherwise.
     """
 
     cycle: int
@@ -158,7 +167,8 @@ class Monitor:
     ----------
     sensor_error
         Largest error of a peak [N], above 0. The first 64 cycles tell the scatter of the process, if it is larger or
-        no error is stated: chaos from the start on may be taken for it.
+        no error is stated. Chaos from the start on is looked for in the first 128, which takes some tenths of a second
+        at cycles 64, 96 and 128; where none is found it may be taken for scatter.
     longest_period
         Longest period [cycles] that counts as repeating; the first verdict comes after twice as many cycles.
     on_event
@@ -201,7 +211,7 @@ class Monitor:
         self._equal, self._differed = 1, False
         self._trusted = self.stated is not None
         self._recent: deque[float] = deque(maxlen=RECENT)
-        self._over = 0
+        self._over, self._from_start = 0, False
 
     @property
     def state(self) -> dict[str, Any]:
@@ -221,7 +231,7 @@ class Monitor:
             raise DiagnosisError(f"cycle {self.cycle + 1}: peak = {peak:g} N; allowed: finite forces of 0 N and more")
         died = self._note_equal(float(peak))
         self._recent.append(float(peak))
-        self._learn(float(peak))
+        irregular = self._learn(float(peak))
         gaps = self._sums.add(FIRST, np.array([float(peak)]), self.sensor_error or math.inf)
         # a gap to a peak that is not known yet is NaN, and larger than nothing
         changed = bool((gaps > NO_REPEAT).all()) and not self.alarm
@@ -237,6 +247,8 @@ class Monitor:
         event: Event = "change" if changed and ready else "dead sensor" if died else ""
         if self.alarm != before:
             event = "alarm" if self.alarm else "all clear"
+            self._from_start &= self.alarm
+        event = "irregular from the start" if irregular else event
         amplitude = irregularity(np.array(self._since), 2 * LAGS) if len(self._since) >= LEAST else None
         return self._told(Watch(self.cycle, float(peak), self.alarm if ready else None, level, amplitude, event))
 
@@ -260,30 +272,49 @@ class Monitor:
         before, self.dead = self.dead, self._equal >= DEAD and (self._differed or peak == 0.0)
         return self.dead and not before
 
-    def _learn(self, peak: float) -> None:
-        """Take the scatter of the first cycles for the error, if none is stated or it is larger and no chaos."""
-        if len(self._first) >= LEARNED:
-            return
+    def _learn(self, peak: float) -> bool:
+        """Take the scatter of the first cycles for the error, if none is stated or it is larger and no chaos.
+
+        Return whether these cycles are chaotic.
+        """
+        if len(self._first) >= JUDGED[-1]:
+            return False
         self._first.append(peak)
         seen = np.array(self._first)
         if self.stated is not None and len(seen) == TRIED:
             self._trusted = self._scatter(seen) <= QUIET * self.stated
-        if len(seen) < LEARNED:
-            return
-        learned = self._scatter(seen)
-        if self.stated is None:
-            self.sensor_error = max(learned, 1e-6 * float(np.max(seen)), 1e-300)
-        elif not self._trusted and learned > self.stated and not self.alarm and not _is_deterministic(seen):
-            self.sensor_error = learned
-            self._sums.quieten(FIRST)
-        self._trusted = True
+        if len(seen) == LEARNED:
+            learned = self._scatter(seen)
+            if self.stated is None:
+                self.sensor_error = max(learned, 1e-6 * float(np.max(seen)), 1e-300)
+            elif not self._trusted and learned > self.stated and not self.alarm and not _is_deterministic(seen):
+                self.sensor_error = learned
+                self._sums.quieten(FIRST)
+            self._trusted = True
+        unknown = self.sensor_error != self.stated and not self.alarm and not self._from_start
+        return unknown and len(seen) in JUDGED and self._is_chaotic(seen)
+
+    def _is_chaotic(self, seen: Array) -> bool:
+        """Whether the first readings (cycles,) are chaotic; then the error is what their map leaves."""
+        from chaosgym.recordings.judge import judge_peaks
+
+        try:
+            found = judge_peaks(seen)
+        except DiagnosisError:  # readings beyond what is judged
+            return False
+        self._from_start = found.diagnosis.nature == "chaotic" and not found.changes
+        if self._from_start:
+            spread = float(np.std(seen))
+            left = OF_MAP * math.sqrt(found.diagnosis.evidence["nonlinear_rest"]) * spread
+            self.sensor_error = max(self.stated or 0.0, min(left, OF_SCATTER * spread), 1e-6 * float(np.max(seen)))
+        return self._from_start
 
     def _is_new(self) -> bool:
         """Whether scatter beyond the error is none that the process has from the start, and no burst of it."""
         recent, error = np.array(self._recent), self.sensor_error
         if self.stated is not None and len(self._first) < LEARNED:
             return (self._trusted and len(self._first) >= TRIED) or _is_deterministic(recent)
-        if error is None or error == self.stated or self._over > LASTS:
+        if error is None or error == self.stated or self._from_start or self._over > LASTS:
             return True
         return self._scatter(recent[-2 * self.longest_period :]) > LARGE * error or _is_deterministic(recent)
 
