@@ -153,7 +153,7 @@ def test_the_cycle_of_a_long_series_is_that_of_all_of_it(tmp_path):
     assert any("beside the stated" in note for note in cut.notes)
 
 
-def test_a_series_needs_at_most_three_times_its_file(tmp_path):
+def test_a_series_needs_less_than_three_times_its_file(tmp_path):
     """Six million readings in single precision, from the file to the peaks."""
     value = 30.0 * np.maximum(np.sin(0.01 * np.arange(6_000_000)), 0.0)
     np.save(tmp_path / "long.npy", value.astype(np.float32))
@@ -166,4 +166,4 @@ def test_a_series_needs_at_most_three_times_its_file(tmp_path):
         held = tracemalloc.get_traced_memory()[1]
     finally:
         tracemalloc.stop()
-    assert held < 3 * (tmp_path / "long.npy").stat().st_size
+    assert held < 2.7 * (tmp_path / "long.npy").stat().st_size

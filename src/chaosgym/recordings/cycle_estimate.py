@@ -194,8 +194,12 @@ def _between(power: Array, best: int) -> float:
 
 def _power(value: Array, padded: int) -> Array:
     """Power of the spectrum of a signal without its mean, under a Hann window."""
-    signal = np.asarray(value, dtype=float)
-    return np.asarray(np.abs(np.fft.rfft((signal - signal.mean()) * np.hanning(len(signal)), padded)) ** 2)
+    signal = np.array(value, dtype=float)
+    signal -= signal.mean()
+    signal *= np.hanning(len(signal))
+    power = np.abs(np.fft.rfft(signal, padded))
+    power *= power
+    return power
 
 
 def _averaged(value: Array, several: int) -> Array:
@@ -210,12 +214,13 @@ def strongest_line_nearby(value: Array, step: float, period: float) -> float | N
     if len(value) > LONG:
         several = max(1, int(period / step / PER_CYCLE))
         value, step = _averaged(value, several), several * step
-    padded = 8 * len(value)
+    padded = 4 * len(value)
     power = _power(value, padded)
     place = padded * step / period
     low, high = int(0.95 * place), int(1.05 * place) + 2
-    if low < 16 or high >= len(power):
+    if low < 8 or high >= len(power):
         return None
     peak = low + int(np.argmax(power[low:high]))
-    stands_out = power[peak] > 1e-3 * power[8:].max() and low < peak < high - 1
-    return padded * step / peak if stands_out and abs(peak - place) > 2.0 else None
+    stands_out = power[peak] > 1e-3 * power[4:].max() and low < peak < high - 1
+    line = peak + _between(power, peak) if stands_out else place
+    return padded * step / line if abs(line - place) > 1.0 else None
