@@ -29,6 +29,7 @@ from chaosgym.plotting.comparison_report import comparison_report, comparison_ro
 from chaosgym.plotting.design_report import (
     HEADLINES,
     design_report,
+    report_line,
     report_paths,
     write_report,
 )
@@ -415,13 +416,27 @@ def test_the_tables_are_a_workbook(answered, tmp_path):
         write_workbook(answered, tmp_path / "tables.ods")
 
 
+def test_two_pages_of_one_stem_share_their_numbers(tmp_path):
+    """HTML, then PDF or HTML of another ending: equal numbers are written once."""
+    first = write_report("<p>", {"a": 1}, tmp_path / "r.html")
+    written = first[1].stat().st_mtime_ns
+    paths = write_report("<p>", {"a": 1}, tmp_path / "r.htm")
+    assert paths[1] == first[1]
+    assert first[1].stat().st_mtime_ns == written
+    assert report_line(paths) == f"report: {tmp_path / 'r.htm'}"
+
+
 def test_nothing_is_overwritten_unasked(answered, tmp_path):
-    """An existing page, or numbers beside it, stay as they are."""
+    """An existing page stays as it is, and so do numbers of its stem: those of the page go under its whole name."""
     (tmp_path / "report.json").write_text("mine")
-    with pytest.raises(DesignError, match=r"report\.json exists"):
-        write_report("<p>", {}, tmp_path / "report.html")
-    assert [path.name for path in tmp_path.iterdir()] == ["report.json"]
+    paths = write_report("<p>", {}, tmp_path / "report.html")
+    assert [path.name for path in paths] == ["report.html", "report.html.json"]
+    assert "its numbers: " in report_line(paths)
     assert (tmp_path / "report.json").read_text() == "mine"
+    for name, taken in (("report.html", r"report\.html"), ("report.htm", r"report\.json")):
+        (tmp_path / "report.htm.json").write_text("mine too")
+        with pytest.raises(DesignError, match=f"{taken} exists; choose another name"):
+            write_report("<p>", {}, tmp_path / name)
     write_report("<p>", {"a": 1}, tmp_path / "report.html", overwrite=True)
     assert json.loads((tmp_path / "report.json").read_text()) == {"a": 1}
     with pytest.raises(DesignError, match="is no folder"):

@@ -103,8 +103,8 @@ def design(
         begun = f" --initial-state {initial_state}" if initial_state else ""
         command = f"chaosgym design {brief}{begun}{' --verdict-only' if verdict_only else ''} --seed {seed}"
         date = datetime.date.today().isoformat()
-        report.write_report(report.design_report(answer, command, date=date, brief=text), result, out, overwrite)
-        lines = [*lines, f"report: {out}"]
+        page = report.design_report(answer, command, date=date, brief=text)
+        lines = [*lines, report.report_line(report.write_report(page, result, out, overwrite))]
     if tables is not None:
         lines = [*lines, f"tables: {write_workbook(answer, tables, overwrite)}"]
     return emit(result, as_json, lambda: lines, picture, lambda plots: plots.study_figure(answer))
@@ -151,7 +151,7 @@ def _compared(
     from chaosgym.design.measured import evaluate_run
     from chaosgym.design.study import most_cycles, study
     from chaosgym.plotting.comparison_report import MEASURED, agreement, comparison_report, comparison_rows
-    from chaosgym.plotting.design_report import report_paths, write_report
+    from chaosgym.plotting.design_report import report_line, report_paths, write_report
     from chaosgym.recordings.runs import judged_run
 
     if len(set(briefs_given)) < len(briefs_given):
@@ -179,6 +179,5 @@ def _compared(
         command = f"chaosgym design {' '.join(briefs_given)}{' --verdict-only' if verdict_only else ''} --seed {seed}"
         command += f" --beside {beside}" if beside else ""
         page = comparison_report(studies, command, date=date, measured=found)
-        write_report(page, result, out, overwrite)
-        lines = [*lines, f"report: {out}"]
+        lines = [*lines, report_line(write_report(page, result, out, overwrite))]
     emit(result, as_json, lambda: lines)

@@ -69,8 +69,7 @@ def judge(
     life = None if criteria is None else _life(files[0].runs[0], criteria)
     result, lines, draw = _answer(files, life)
     if report is not None:
-        _write(report, files, life, result, overwrite)
-        lines = [*lines, f"report: {report}"]
+        lines = [*lines, _written(report, files, life, result, overwrite)]
     emit(result, as_json, lambda: lines, picture, draw)
 
 
@@ -105,18 +104,19 @@ def _answer(
     return table_as_dict(files), table_lines(files), lambda plots: plots.thumbnails(shown)
 
 
-def _write(
+def _written(
     report: str,
     files: "tuple[JudgedFile, ...]",
     life: "MeasuredPeaks | None",
     result: dict[str, Any],
     overwrite: bool,
-) -> None:
-    from chaosgym.plotting.design_report import write_report
+) -> str:
+    """Where the report was written."""
+    from chaosgym.plotting.design_report import report_line, write_report
     from chaosgym.plotting.recording_report import recording_report
 
     page = recording_report(files, life, date=datetime.date.today().isoformat())
-    write_report(page, result, report, overwrite)
+    return report_line(write_report(page, result, report, overwrite))
 
 
 @click.command("judge-sweep")

@@ -156,6 +156,9 @@ def write_report(
 ) -> tuple[Path, Path]:
     """Write the page as HTML, or as PDF where the name ends so, and the numbers as JSON beside it.
 
+    Numbers of the same stem that exist, as beside the HTML where a PDF follows, stay as they are: equal ones serve both
+    pages, and where they differ these go beside them, into ``r.pdf.json`` of ``r.pdf``.
+
     Returns
     -------
     paths of both files.
@@ -163,33 +166,48 @@ def write_report(
     Raises
     ------
     DesignError
-        If one of them exists and ``overwrite`` is not set, or a PDF is asked for and no browser prints it.
+        If the page or the second name of the numbers exists and ``overwrite`` is not set, or no browser prints a PDF.
     OSError
         If one can't be written.
     """
-    paths = report_paths(out, overwrite)
-    text = json.dumps(numbers, allow_nan=False, indent=1)
-    for path, content in zip(paths, (page, text + "\n"), strict=True):
-        write = print_page if path.suffix.lower() == PDF else _write
-        write_atomically(path, partial(write, content))
-    return paths
+    text = json.dumps(numbers, allow_nan=False, indent=1) + "\n"
+    target, beside = report_paths(out, overwrite)
+    same = beside.exists() and beside.read_bytes() == text.encode()
+    if beside.exists() and not same and not overwrite:
+        beside = _second(target)
+    write_atomically(target, partial(print_page if target.suffix.lower() == PDF else _write, page))
+    if not same:
+        write_atomically(beside, partial(_write, text))
+    return target, beside
+
+
+def report_line(paths: tuple[Path, Path]) -> str:
+    """Where a report is, and its numbers if another report has those of its stem."""
+    page, numbers = paths
+    others = f", its numbers: {numbers}, since {page.with_suffix('.json')} holds others"
+    return f"report: {page}{others if numbers == _second(page) else ''}"
 
 
 def _write(content: str, path: Path) -> None:
     path.write_text(content, encoding="utf-8")
 
 
+def _second(page: Path) -> Path:
+    """Name of the numbers of a report where those of its stem are another report's."""
+    return page.with_name(f"{page.name}.json")
+
+
 def report_paths(out: str | Path, overwrite: bool = False) -> tuple[Path, Path]:
-    """Paths of the HTML or PDF file and the JSON file, both free to be written."""
+    """Paths of the HTML or PDF file, which is free to be written, and of the JSON file, which may exist."""
     page = Path(out)
     if page.suffix.lower() not in (".html", ".htm", PDF):
         raise DesignError(f"{str(out)!r} is no name of a report; allowed: names that end in .html or .pdf")
     if page.suffix.lower() == PDF:
         printing_browser()
     paths = page, page.with_suffix(".json")
-    for path in paths:
-        if path.exists() and not overwrite:
-            raise DesignError(f"{path} exists; choose another name, or say --overwrite")
+    taken = page if page.exists() else paths[1] if paths[1].exists() and _second(page).exists() else None
+    if taken and not overwrite:
+        raise DesignError(f"{taken} exists; choose another name, or say --overwrite")
     if not page.parent.is_dir():
         raise DesignError(f"{page.parent} is no folder")
     for path in paths:
