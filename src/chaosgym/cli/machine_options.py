@@ -101,8 +101,10 @@ class MachineCommand(click.Command):
             raise click.UsageError(message, ctx) from error
 
     def get_params(self, ctx: click.Context) -> list[click.Parameter]:
-        """Return the command's own parameters and the machine's."""
-        return [*_options_of(ctx.meta.get(__name__, ())).values(), *super().get_params(ctx)]
+        """Return the command's own parameters and the machine's, whose rungs stand in the help of ``--fidelity``."""
+        named = ctx.meta.get(__name__, ())
+        own = [_fidelity_of(named[0]) if named and one.name == "fidelity" else one for one in super().get_params(ctx)]
+        return [*_options_of(named).values(), *own]
 
     def format_epilog(self, ctx: click.Context, formatter: click.HelpFormatter) -> None:
         """Say where the options of a machine are, if none is named."""
@@ -110,6 +112,17 @@ class MachineCommand(click.Command):
         if not ctx.meta.get(__name__):
             formatter.write_paragraph()
             formatter.write_text(f"A machine has options of its own: {ctx.command_path} MACHINE --help")
+
+
+ALLOWED = "Error of the peak force that is allowed ('1 %'), or "
+"""How the help of ``--fidelity`` begins."""
+
+
+def _fidelity_of(machine: str) -> click.Option:
+    """The option ``--fidelity`` of a machine."""
+    rungs = list(MACHINES[machine].fidelity_ladder)
+    told = f"one of {', '.join(rungs)}." if len(rungs) > 1 else f"{rungs[0]}, the only model of this machine."
+    return click.Option(["--fidelity"], metavar="ERROR|RUNG", help=ALLOWED + told)
 
 
 def _options_of(machines: Iterable[str]) -> dict[str, click.Option]:
@@ -181,7 +194,7 @@ def machine_command(
     wrapped = click.option(
         "--fidelity",
         metavar="ERROR|RUNG",
-        help="Error of the peak force that is allowed ('1 %'), or a rung of the ladder of models, such as fine.",
+        help=f"{ALLOWED}a name of the machine's ladder of models, which MACHINE --help lists.",
     )(wrapped)
     wrapped = click.option(
         "--set",
