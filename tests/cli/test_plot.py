@@ -174,7 +174,7 @@ def test_headings_of_small_pictures_stay_above_their_own():
 
 def test_a_title_is_broken_where_the_picture_ends():
     """A long name with a long verdict is whole."""
-    headline = "periodic, period 1, if its scatter of 0.77 % is random (margin 0.29)"
+    headline = "periodic, period 1, if its scatter of 0.77 % is random (margin 0.29 of 1)"
     statement = SimpleNamespace(headline=headline)
     verdict = SimpleNamespace(diagnosis=SimpleNamespace(nature="periodic", statement=statement))
     figure = measured_figure(

@@ -96,7 +96,7 @@ class Statement(NamedTuple):
 
     @property
     def headline(self) -> str:
-        """Nature and certainty, such as "periodic, period 2 (certified, margin 1.00)"."""
+        """Nature and certainty, such as "periodic, period 2 (certified, margin 1.00 of 1)"."""
         return f"{self.nature} ({self.certainty})"
 
     def lines(self) -> list[str]:
@@ -217,11 +217,12 @@ class Diagnosis:
         Examples
         --------
         >>> chaosgym.two_step_test([1.0, 2.0] * 40).statement.lines()[0]
-        'periodic, period 2 (margin 1.00)'
+        'periodic, period 2 (margin 1.00 of 1)'
         """
+        margin = f"margin {self.margin:.2f} of 1"
         return Statement(
             nature=self.words,
-            certainty=f"{self.status}, margin {self.margin:.2f}" if self.status else f"margin {self.margin:.2f}",
+            certainty=f"{self.status}, {margin}" if self.status else margin,
             reason=self.reason,
             transient=self._transient(),
             horizon=self._horizon(),
