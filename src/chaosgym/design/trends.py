@@ -86,6 +86,10 @@ def impacts_against(
     return tuple(parallel_map(run, list(clearances), workers=workers))
 
 
+VISIBLE = 1.05
+"""Ratio of lives from which a bar between them is seen."""
+
+
 @dataclass(frozen=True)
 class LifeTrend(Result):
     """Life along a range of one field.
@@ -117,6 +121,12 @@ class LifeTrend(Result):
     largest_peak: Array
     mean_peak: Array
     reference: float
+
+    @property
+    def scatters(self) -> bool:
+        """Whether peaks of one machine differ enough for the largest and the smallest to suggest other lives."""
+        touching = np.isfinite(self.lowest)
+        return bool(np.any(self.highest[touching] > VISIBLE * self.lowest[touching]))
 
     def longer_lived(self, nominal: float, factor: float) -> list[float]:
         """Values nearest to nominal, one on either side, whose life is longer by a factor, and one without contact.

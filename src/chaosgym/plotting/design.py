@@ -49,7 +49,7 @@ def peak_record(peaks: Array, exponent: float, left: Axes, right: Axes) -> None:
     top = 1.15 * float(np.max(peaks)) or 1.0
     left.set(xlabel="cycle", ylabel="peak force [N]", ylim=(0.0, top), title="Peak force of every cycle")
     right.set(
-        xlabel=f"share of cycles ({len(found.modes)} mode{'s' * (len(found.modes) > 1)})",
+        xlabel="share of cycles" + (f" ({len(found.modes)} heaps)" if len(found.modes) > 1 else ""),
         ylim=(0.0, top),
         title="How often",
     )
@@ -141,7 +141,7 @@ def life_over_speed(trend: LifeTrend, machine: Machine, ax: Axes) -> Axes:
     if len(calm):
         ax.plot(calm, np.full(len(calm), 0.97), "|", color=INK, transform=ax.get_xaxis_transform(), label="no contact")
     ax.axvline(factor * getattr(machine, trend.field), color=MUTED, lw=1.0, ls=":")
-    ax.set(yscale="log", xlabel=label, ylabel="relative life (cubic law)", title="What speed costs")
+    ax.set(yscale="log", xlabel=label, ylabel="relative life (exponent 3)", title="What speed costs")
     ax.legend(loc="lower left", ncols=2)
     return ax
 

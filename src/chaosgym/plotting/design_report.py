@@ -245,9 +245,10 @@ def _pictures(study: DesignStudy) -> list[Picture]:
         pictures.append(picture_of(drawn_by(lambda ax: figures.type_map_around(result, region, ax)), caption))
     if study.life_over_speed is not None:
         trend = study.life_over_speed
+        bars = "; bars: what the largest and the smallest peak alone would suggest" if trend.scatters else ""
         caption = (
-            "Life relative to the lowest speed with contact. Dots: statistical mean life; bars: what the largest and "
-            "the smallest peak alone would suggest. Dotted: the design."
+            "Life relative to the lowest speed with contact, by the cube of the force as in the thesis, whatever the "
+            f"exponent of the life above. Dots: statistical mean life{bars}. Dotted: the design."
         )
         pictures.append(picture_of(drawn_by(lambda ax: figures.life_over_speed(trend, machine, ax)), caption))
     begun = machine.begins_from()
