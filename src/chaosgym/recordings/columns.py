@@ -98,18 +98,17 @@ def rises(values: Array) -> bool:
 
 
 def force_names(recording: Recording) -> list[str]:
-    """Columns that could be forces: those with a unit of force, or those that nothing speaks against; else others."""
+    """Columns that could be forces: those in a unit of force, or that nothing speaks against; else of another quantity.
+
+    Where there is none of these, it is those in a unit that is not known, of which a person may state another.
+    """
     known = [name for name, unit in recording.units.items() if unit in FORCES]
     usable = [name for name in recording.columns if name not in recording.problems or recording.problems[name]]
     named = [name for name in known if name in usable]
     plain = [name for name in usable if not _speaks_against(recording, name)]
-    others = [name for name in usable if _is_judged(recording.units.get(name, "")) or _other(recording, name)]
-    return named or plain or others
-
-
-def _is_judged(unit: str) -> bool:
-    """Whether readings in a unit may be judged: in their own, or in one that a person states in place of no unit."""
-    return unit in OTHERS or bool(unit and unit not in UNITS)
+    others = [name for name in usable if recording.units.get(name, "") in OTHERS or _other(recording, name)]
+    unknown = [name for name in usable if (unit := recording.units.get(name, "")) and unit not in UNITS]
+    return named or plain or others or unknown
 
 
 def _other(recording: Recording, name: str) -> str:
