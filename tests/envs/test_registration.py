@@ -88,7 +88,8 @@ def test_entry_points_are_strings() -> None:
 
 def test_what_needs_stable_baselines3_says_what_to_install(monkeypatch: pytest.MonkeyPatch) -> None:
     """It is an extra, and who reads Gymnasium's pages may not have it."""
-    monkeypatch.setitem(sys.modules, "stable_baselines3", None)
+    for name in {"stable_baselines3", *(name for name in sys.modules if name.startswith("stable_baselines3."))}:
+        monkeypatch.setitem(sys.modules, name, None)
     monkeypatch.delitem(sys.modules, "chaosgym.envs.sb3", raising=False)
     with pytest.raises(ImportError, match=r"SB3VecEnv needs stable-baselines3: pip install '\.\[learn\]'"):
         _ = chaosgym.envs.SB3VecEnv
