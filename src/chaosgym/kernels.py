@@ -54,9 +54,8 @@ def _calls(folder: Path) -> Iterator[tuple[str, Callable[[], object]]]:
     """What calls the kernels that users meet, by name; files of machines go into a folder."""
     import gymnasium
 
-    from chaosgym import ImpactBeam, Operator, RungeKutta4, SliderCrank, diagnose, read_machine, simulate
+    from chaosgym import ImpactBeam, RungeKutta4, SliderCrank, diagnose, read_machine, simulate
     from chaosgym.classifier import classifier_for
-    from chaosgym.control.controllers import Kriging
     from chaosgym.envs import ENVIRONMENTS, register_environments
     from chaosgym.machines.machine_file import TEMPLATES, template
 
@@ -82,11 +81,6 @@ def _calls(folder: Path) -> Iterator[tuple[str, Callable[[], object]]]:
             env.reset(seed=1)
             env.step(env.action_space.sample())
 
-    def one_reading() -> None:
-        operator = Operator(Kriging(), ENVIRONMENTS[1])
-        operator.start(speed=15.0, demand=18.0)
-        operator.next([90.0] * 10, demand=18.0)
-
     register_environments()
     yield "diagnose impact-beam", partial(diagnose, beam)
     yield "diagnose slider-crank", partial(diagnose, crank, budget=200)
@@ -103,7 +97,6 @@ def _calls(folder: Path) -> Iterator[tuple[str, Callable[[], object]]]:
     yield "those of the crank", partial(several, crank)
     for name in (*ENVIRONMENTS[:2], *ENVIRONMENTS[3:5], "chaosgym/AnyMachine-v0"):
         yield name, partial(one_step, name)
-    yield "a rig", one_reading
 
 
 def compile_all() -> None:
