@@ -103,7 +103,7 @@ def run_in_exudyn(machine: Machine, cycles: int, setting: ExudynSetting, *, forc
             sensors.append(system.AddSensor(sensor))
     system.Assemble()
     steps = math.ceil(machine.cycle_period / setting.step)
-    settings = _settings(exudyn, machine.cycle_period, cycles, steps, setting)
+    settings = solver_settings(exudyn, machine.cycle_period, cycles, steps, setting)
     solver = getattr(exudyn.DynamicSolverType, setting.solver)
     seconds = processor_seconds(lambda: system.SolveDynamic(settings, solverType=solver))
     if not forces:
@@ -123,7 +123,7 @@ def _run_mechanism(
     sensor = _add_mechanism(exudyn, system, machine, forces)
     system.Assemble()
     steps = math.ceil(machine.cycle_period / setting.step)
-    settings = _settings(exudyn, machine.cycle_period, cycles, steps, setting)
+    settings = solver_settings(exudyn, machine.cycle_period, cycles, steps, setting)
     solver = getattr(exudyn.DynamicSolverType, setting.solver)
     seconds = processor_seconds(lambda: system.SolveDynamic(settings, solverType=solver))
     if sensor is None:
@@ -132,7 +132,7 @@ def _run_mechanism(
     return seconds, force.reshape(cycles, steps).max(axis=1)
 
 
-def _settings(exudyn: Any, period: float, cycles: int, steps: int, setting: ExudynSetting) -> Any:
+def solver_settings(exudyn: Any, period: float, cycles: int, steps: int, setting: ExudynSetting) -> Any:
     """``settings_of``, with those of implicit solvers and the tolerance of limit stops."""
     settings = settings_of(exudyn, period, cycles, steps)
     settings.timeIntegration.generalizedAlpha.spectralRadius = 1.0
@@ -204,7 +204,7 @@ def _add_mechanism(exudyn: Any, system: Any, machine: MechanismMachine, forces: 
     for joint in mechanism.joints:
         ends = [marker(joint.first), marker(joint.second)]
         if joint.opened:
-            pin = _add_pin(exudyn, system, ends, machine, joint.name)
+            pin = add_pin(exudyn, system, ends, machine, joint.name)
         else:
             system.AddObject(items.ObjectJointRevolute2D(markerNumbers=ends))
     if not forces:
@@ -213,7 +213,7 @@ def _add_mechanism(exudyn: Any, system: Any, machine: MechanismMachine, forces: 
     return system.AddSensor(items.SensorObject(objectNumber=pin, storeInternal=True, outputVariableType=kind))
 
 
-def _add_pin(exudyn: Any, system: Any, ends: list[Any], machine: MechanismMachine, joint: str) -> Any:
+def add_pin(exudyn: Any, system: Any, ends: list[Any], machine: MechanismMachine, joint: str) -> Any:
     """Put a pin into its hole; without a stiffness of its own, from which Exudyn would take a wrong Jacobian."""
     symbolic = exudyn.symbolic
     gap, stiffness, damping = (getattr(machine, f"{joint}_{name}") for name in ("clearance", "stiffness", "damping"))
