@@ -11,6 +11,30 @@ os.environ.setdefault("OMP_WAIT_POLICY", "passive")
 import numpy as np
 import pytest
 
+LONG = (
+    "tests/test_package.py",
+    "tests/golden/test_digests.py",
+    "tests/uncompiled/test_uncompiled.py",
+    "tests/test_kills.py",
+    "tests/test_site.py",
+    "tests/cli/test_answers.py",
+    "tests/cli/test_full_disk.py",
+    "tests/diagnosis/test_attractors.py",
+    "tests/diagnosis/test_whole_box.py",
+    "tests/branches/test_branch.py",
+)
+"""Files of minutes. They begin first, so that a run does not end with one of them on one processor."""
+
+
+def pytest_configure(config):
+    """Let pytest-xdist keep the order of files: by itself it begins with those of many tests, and ends with one."""
+    config.option.loadscopereorder = False
+
+
+def pytest_collection_modifyitems(items):
+    """Begin with the long files."""
+    items.sort(key=lambda item: next((k for k, name in enumerate(LONG) if item.nodeid.startswith(name)), len(LONG)))
+
 
 @pytest.fixture(scope="session")
 def folder(tmp_path_factory):
