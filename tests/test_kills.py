@@ -5,6 +5,7 @@ again in another folder and killed at a moment drawn over that time, one time in
 the next start is in a new folder. Every run of the test draws another moment. ``CHAOSGYM_KILLS=30`` kills 30 times.
 """
 
+import csv
 import json
 import os
 import random
@@ -16,6 +17,9 @@ from pathlib import Path
 
 import pyarrow.parquet as pq
 import pytest
+
+from chaosgym.control.policies import load_policy
+from chaosgym.control.rollout import play
 
 ROOT = Path(__file__).parent.parent
 MOMENTS = int(os.environ.get("CHAOSGYM_KILLS", "1"))
@@ -75,6 +79,14 @@ def _training(script):
 def _policy(out):
     rows = [line.rpartition(",")[0] for line in (out / "progress.csv").read_text().splitlines()]
     return [(out / name).read_bytes() for name in ("policy.json", "weights.npz")], rows
+
+
+def _agent(out):
+    """The same of a training whose last row is of whole jobs, and whose policy plays one without torch."""
+    last = list(csv.DictReader((out / "progress.csv").read_text().splitlines()))[-1]
+    assert float(last["return"]) < 0.0 <= float(last["type_iii"]) <= 1.0
+    assert play(load_policy(out), BEAM, range(1)).returns.max() < 0.0
+    return _policy(out)
 
 
 def _calibration(out):
@@ -166,10 +178,10 @@ def _jobs_of_minari(out):
 
 WORK = {
     "a sweep": (_sweep, _rows),
-    "training": (_training("ppo"), _policy),
-    "training of recurrent PPO": (_training("recurrent_ppo"), _policy),
-    "training under a constraint": (_training("constrained_ppo"), _policy),
-    "training of SAC": (_training("sac"), _policy),
+    "training": (_training("ppo"), _agent),
+    "training of recurrent PPO": (_training("recurrent_ppo"), _agent),
+    "training under a constraint": (_training("constrained_ppo"), _agent),
+    "training of SAC": (_training("sac"), _agent),
     "a learned map": (_training("learn_map"), _policy),
     "a classifier": (_classifier, _learned),
     "a design": (_design, _report),
