@@ -134,11 +134,16 @@ def test_asking_for_pages_computes_nothing_and_they_are_bounded():
 
 @pytest.mark.slow
 def test_memory_of_closed_pages_is_given_back():
-    """A second and a third dozen pages hold no more than the first, within a tenth."""
-    with served("impact-beam", with_process=True) as (address, process):
+    """A second and a third dozen pages hold no more than the first, within a tenth.
+
+    Pages without a browser are closed after four seconds here, and after half a minute otherwise.
+    """
+    soon = "check_unused_sessions_milliseconds=1000, unused_session_lifetime_milliseconds=3000"
+    before = f"import bokeh.server.server as s, functools; s.Server = functools.partial(s.Server, {soon})"
+    with served("impact-beam", with_process=True, before=before) as (address, process):
         place, held = urlparse(address), []
         for again in range(3):
-            time.sleep(40.0 if again else 0.0)  # pages without a browser are closed after half a minute
+            time.sleep(8.0 if again else 0.0)
             for _ in range(12):
                 with answer(place) as found:
                     assert found.status == 200
