@@ -73,8 +73,11 @@ def shares(sizes: dict[str, int], count: int) -> dict[str, int]:
     return {name: whole[name] + (name in late[: count - sum(whole.values())]) for name in sizes}
 
 
-def sample(count: int, seed: int) -> Iterator[Change]:
-    """Changes of the library, ``count`` of them, in an order that is drawn as well: the first are a sample too."""
+def sample(count: int, seed: int, wanted: tuple[str, ...] = ()) -> Iterator[Change]:
+    """Changes of the library, ``count`` of them, in an order that is drawn as well: the first are a sample too.
+
+    Of some wings alone, if they are named: what is drawn of a wing does not hang on the others.
+    """
     modules = wings()
     lines = {wing: [len(path.read_text().splitlines()) for path in paths] for wing, paths in modules.items()}
     places = [
@@ -83,6 +86,8 @@ def sample(count: int, seed: int) -> Iterator[Change]:
     draw = random.Random(seed)
     draw.shuffle(places)
     for number, wing in enumerate(places):
+        if wanted and wing not in wanted:
+            continue
         own = random.Random(f"{seed} {number}")
         while not (made := changes(own.choices(modules[wing], lines[wing])[0])):
             pass
@@ -180,8 +185,8 @@ def run(file: Path, count: int, seed: int, wanted: tuple[str, ...] = (), *, most
     with tempfile.TemporaryDirectory() as folder, file.open("a") as out:
         source = Path(folder) / "src"
         shutil.copytree(LIBRARY, source / "chaosgym", ignore=shutil.ignore_patterns("__pycache__"))
-        for change in sample(count, seed):
-            if change.number in tried or (wanted and change.wing not in wanted):
+        for change in sample(count, seed, wanted):
+            if change.number in tried:
                 continue
             if most is not None and len(tried) - len(rows) >= most:
                 return

@@ -45,6 +45,7 @@ def test_a_change_is_one_place_of_a_module_and_the_same_each_time():
     first, again = (list(islice(sample(600, 0), 4)) for _ in range(2))
     assert first == again
     assert first != list(islice(sample(600, 1), 4))
+    assert next(sample(600, 0, (first[0].wing,))) == first[0], "a wing is drawn by itself"
     for change in first:
         assert isinstance(change, Change)
         there = (LIBRARY / change.path).read_text()
