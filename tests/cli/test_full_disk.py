@@ -81,7 +81,7 @@ def test_a_picture_on_a_full_disk_is_one_line(tmp_path):
 
 @pytest.mark.slow
 def test_every_command_ends_cleanly_on_a_full_disk_and_with_a_closed_output(tmp_path):
-    """With /dev/full as output one line; with none at all nothing is said, and the work is done."""
+    """With /dev/full as output one line; with none at all a quick command says nothing, and does its work."""
     ended(f"{MAP} --out map", cwd=tmp_path, stdout=subprocess.DEVNULL)
     for name, forms in (LONG | QUICK).items():
         words = name.replace("-", " ", 1) if name.startswith("dataset-") else name
@@ -90,6 +90,8 @@ def test_every_command_ends_cleanly_on_a_full_disk_and_with_a_closed_output(tmp_
             continue
         with Path("/dev/full").open("wb") as full:
             assert say_no_space(*ended(command, cwd=tmp_path, stdout=full)), command
+        if name not in QUICK:
+            continue
         fresh = re.sub(r"--(\S*out|fmu) (\S+)", r"--\1 second-\2", command)
         assert ended(fresh, cwd=tmp_path, preexec_fn=lambda: os.close(1)) == (0, []), command
 
