@@ -65,6 +65,8 @@ def arguments() -> argparse.Namespace:
     parser.add_argument("--learning-rate", type=float, default=1e-3)
     parser.add_argument("--dropout", type=float, default=0.4)
     parser.add_argument("--units", type=int, default=256)
+    parser.add_argument("--least-gain", type=float, default=0.0, help="Expected, for which it leaves the demand.")
+    parser.add_argument("--wary", action="store_true", help="It leaves only a demand that it has felt.")
     return parser.parse_args()
 
 
@@ -257,7 +259,7 @@ def train(asked: argparse.Namespace) -> None:
         raise ModelFileError(f"the task has {len(mean)} speeds; allowed: {10_000 // CHANNELS}")
     fit = Fit(rows_of(envs, jobs, mean, deviation), asked)
     fit.run(asked)
-    told = envs.nominal.definition, envs.task.cycles_per_step
+    told = envs.nominal.definition, envs.task.cycles_per_step, asked.least_gain, asked.wary
     save_policy(LearnedMap(asked.env, fit.exported(), mean, deviation, *told), asked.out)
     print(f"policy in {asked.out}")
 

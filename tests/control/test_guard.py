@@ -67,7 +67,7 @@ def test_the_map_of_the_fleet_plays_where_the_policy_is_not_asked():
     assert not guard.followed.any()
     assert guard.statement() == "this machine is foreign to the policy, so its guard asked the shipped map of the fleet"
     assert guarded.returns.mean() > follow.returns.mean() + 2.0
-    fleet = GuardedPolicy(replace(shipped_policy(ENV, "fleet"), least_gain=LEAST_GAIN))
+    fleet = GuardedPolicy(replace(shipped_policy(ENV, "fleet"), least_gain=LEAST_GAIN, wary=False))
     alone = play(fleet, ENV, seeds=SEEDS, **light)
     assert (alone.speed[30:] == guarded.speed[30:]).mean() > 0.8
     assert not fleet.followed.any()

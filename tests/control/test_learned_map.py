@@ -43,6 +43,19 @@ def test_it_goes_to_the_nearest_speed_that_is_calm():
     assert job.deviation.max() < 0.2
 
 
+def test_a_wary_map_leaves_a_demand_that_it_has_felt():
+    """Irregular at 20 Hz and calm beside it: it goes at once, after a step at 20 Hz, or never."""
+    logits = np.where(TASK.grid == 20.0, WILD, CALM)
+    for wary, gain, first, then in ((False, 0.05, 0.25, 0.25), (True, 0.05, 0.0, 0.25), (False, 0.95, 0.0, 0.0)):
+        policy = _map_of(logits, np.full(SPEEDS, 80.0))
+        policy.least_gain, policy.wary = gain, wary
+        envs = native_envs(ENV, 2, action="speed", lowest_demand=20.0)
+        envs.reset(seed=0)
+        policy.start(envs)
+        asked = [policy(_observed(speed, 20.0))[0, 0] for speed in (18.0, 20.0)]
+        assert np.abs(np.subtract(asked, 20.0)).tolist() == [first, then]
+
+
 def test_where_life_counts_it_goes_to_the_least_load():
     """The same network, with the weights of another objective: the one speed of half the load, within the band."""
     peaks = np.where(TASK.grid == 23.0, 40.0, 80.0)
@@ -79,15 +92,19 @@ def test_a_settled_reading_takes_the_place_of_one_on_the_way():
 def test_a_map_is_saved_and_refused_where_it_does_not_fit(tmp_path):
     """Files give the same speeds; another machine, other speeds and shapes that do not fit end in one line."""
     policy = _map_of(np.linspace(WILD, CALM, SPEEDS), np.linspace(60.0, 90.0, SPEEDS))
+    policy.least_gain, policy.wary = 0.125, True
     save_policy(policy, tmp_path)
     job, again = (play(player, ENV, [3], steps=20) for player in (policy, load_policy(tmp_path)))
     np.testing.assert_array_equal(job.speed, again.speed)
+    assert (load_policy(tmp_path).least_gain, load_policy(tmp_path).wary) == (0.125, True)
     with pytest.raises(ModelFileError, match=r"machine impact-beam.*slider-crank"):
         play(policy, "chaosgym/SliderCrank-v1", [0], steps=2)
     with pytest.raises(ModelFileError, match=f"knows {SPEEDS} speeds; this task has 29"):
         play(policy, ENV, [0], steps=2, trim_step=0.5)
     with pytest.raises(ModelFileError, match="a deviation of the readings is not positive"):
         LearnedMap(ENV, policy.network, policy.mean, 0.0 * policy.deviation)
+    with pytest.raises(ModelFileError, match=r"the least gain is -1\.0; allowed: 0 or more"):
+        LearnedMap(ENV, policy.network, policy.mean, policy.deviation, least_gain=-1.0)
     with pytest.raises(ModelFileError, match="the mean of the readings is"):
         LearnedMap(ENV, policy.network, policy.mean[:, :2], policy.deviation)
     with pytest.raises(ModelFileError, match="expected: float32"):

@@ -172,4 +172,4 @@ def _wider(policy: Any, envs: Any) -> GuardedPolicy | None:
     if found is None or len(found.mean) != len(envs.task.grid):
         return None
     itself = isinstance(policy, LearnedMap) and np.array_equal(policy.mean, found.mean)
-    return None if itself else GuardedPolicy(replace(found, least_gain=LEAST_GAIN), fleet=False)
+    return None if itself else GuardedPolicy(replace(found, least_gain=LEAST_GAIN, wary=False), fleet=False)

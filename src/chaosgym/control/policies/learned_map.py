@@ -78,6 +78,10 @@ class FeltSpeeds:
     def memory(self, values: NDArray[np.float32]) -> None:
         self._felt[:] = values
 
+    def felt(self, places: NDArray[np.int64]) -> NDArray[np.bool_]:
+        """Whether anything was felt in this job at a place of the grid, (N,) each."""
+        return np.asarray(self._felt[self._jobs, places, 0] > 0.0)
+
     def unusual(self, observations: Observations) -> Array:
         """How far the readings lie from what is usual at their speed, in standard deviations, (N, 5)."""
         place = place_of(seen(observations, "speed"), self.task)
@@ -135,6 +139,8 @@ class LearnedMap(Controller):
         Cycles of the steps that it learned from; 0 for those of the machine's own task.
     least_gain
         Expected gain of a step for which it leaves the demand.
+    wary
+        Whether a demand that was not felt yet counts as calm, the lower bound of its share.
 
     Raises
     ------
@@ -156,6 +162,7 @@ class LearnedMap(Controller):
     machine: str = ""
     cycles_per_step: int = 0
     least_gain: float = 0.0
+    wary: bool = False
     knows: str = "measurements"
     _felt: FeltSpeeds = field(init=False, repr=False)
 
@@ -168,6 +175,8 @@ class LearnedMap(Controller):
                 raise ModelFileError(f"the {name} of the readings is {values.shape}; expected: {shape}, all finite")
         if not (self.deviation > 0.0).all():
             raise ModelFileError("a deviation of the readings is not positive")
+        if not 0.0 <= self.least_gain < np.inf:
+            raise ModelFileError(f"the least gain is {self.least_gain}; allowed: 0 or more")
         self.network.check(CHANNELS * shape[0] + 1, 2 * shape[0])
 
     def begin(self, envs: Any) -> None:
@@ -232,7 +241,8 @@ class LearnedMap(Controller):
         cost = self.cost(share, lost, demand, grid)
         cost[np.abs(grid - demand[:, None]) > task.largest_trim + 0.5 * task.trim_step] = np.inf
         best, least = grid[cost.argmin(axis=1)], cost.min(axis=1)
-        if self.least_gain == 0.0:
+        if self.least_gain == 0.0 and not self.wary:
             return np.asarray(best)
-        here = cost[np.arange(self.count), place_of(demand, task)]
-        return np.where(least < here - self.least_gain, best, demand)
+        every, at = np.arange(self.count), place_of(demand, task)
+        unknown = share[every, at] * (self.wary & ~self._felt.felt(at))
+        return np.where(least < cost[every, at] - task.type_iii_weight * unknown - self.least_gain, best, demand)

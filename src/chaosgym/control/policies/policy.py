@@ -251,7 +251,8 @@ def save_policy(policy: "TrainedPolicy | LearnedMap", folder: str | Path) -> Non
         description["cycles_per_step"] = policy.cycles_per_step
     if isinstance(policy, LearnedMap):
         arrays |= {"mean": policy.mean, "deviation": policy.deviation}
-        description |= {"action": MAP}
+        rule = {"least_gain": policy.least_gain, "wary": policy.wary}
+        description |= {"action": MAP} | {name: value for name, value in rule.items() if value}
     else:
         if policy.normalisation:
             arrays |= {"mean": policy.normalisation.mean, "deviation": policy.normalisation.deviation}
@@ -316,7 +317,9 @@ def _policy(description: dict[str, Any], arrays: dict[str, Array]) -> TrainedPol
     env, machine = str(description["env"]), str(description.get("machine", ""))
     cycles = int(description.get("cycles_per_step", 0))
     if description["action"] == MAP:
-        return LearnedMap(env, Network(None, layers), arrays["mean"], arrays["deviation"], machine, cycles)
+        usually = arrays["mean"], arrays["deviation"]
+        rule = float(description.get("least_gain", 0.0)), bool(description.get("wary", False))
+        return LearnedMap(env, Network(None, layers), *usually, machine, cycles, *rule)
     limit = description["normalisation_limit"]
     lstm = Lstm(*(arrays[f"lstm.{name}"] for name in Lstm._fields)) if description["lstm"] else None
     usual = None
