@@ -105,7 +105,9 @@ POLICIES = {
     "ImpactBeamTolerance-v1": ["python agents/learn_map.py --seed 0 --steps 600000"],
     "ImpactBeamWear-v1": ["python agents/learn_map.py --seed 0 --steps 600000"],
     "SliderCrankTolerance-v1": [f"python agents/ppo.py --fidelity draft --seed 0 --steps 240000 {LARGE}"],
-    "ImpactBeamTolerance-v1-fleet": of_five_runs("ImpactBeamTolerance-v1", 368_640, "", "--units 512 --dropout 0.3"),
+    "ImpactBeamTolerance-v1-fleet": of_five_runs(
+        "ImpactBeamTolerance-v1", 368_640, "", "--units 512 --dropout 0.3 --least-gain 0.05 --wary"
+    ),
     "SliderCrankTolerance-v1-fleet": of_five_runs(
         "SliderCrankTolerance-v1", 230_400, "--fidelity draft", "--units 512 --dropout 0.4 --epochs 12"
     ),

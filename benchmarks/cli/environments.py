@@ -86,6 +86,18 @@ def told(machines: int, split: str, as_json: bool) -> None:
 
 
 @click.command()
+@click.option("--machines", type=click.IntRange(2, 10_000), default=128, show_default=True)
+@AS_JSON
+def risk(machines: int, as_json: bool) -> None:
+    """Tell what the map of the beams' fleet wins and how many machines it makes worse, by when it leaves the demand."""
+    from benchmarks.envs.risk import lines
+    from benchmarks.envs.risk import risk as run
+
+    found = run(machines)
+    emit({"rows": found}, as_json, lambda: lines(found))
+
+
+@click.command()
 @click.option("--machines", type=click.IntRange(2, 192), default=24, show_default=True)
 @click.option("--jobs", type=click.IntRange(2, 100), default=4, show_default=True, help="Of each machine.")
 @click.option("--kept", type=click.Path(dir_okay=False, path_type=Path), default=None, help="File of the returns.")
@@ -244,6 +256,7 @@ COMMANDS = (
     sense,
     mismatch,
     told,
+    risk,
     job_memory,
     entry,
     arrivals,

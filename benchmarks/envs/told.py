@@ -38,13 +38,14 @@ played on 768 machines of training, with a part of the steps at random speeds.""
 
 
 class Watched(LearnedMap):
-    """The shipped map; of every held step it keeps the label, and what map, felt irregularity and sense make of it."""
+    """The shipped map, at once and for any gain; of every held step it keeps the label, and what others make of it."""
 
     tells = ""
 
     def __init__(self) -> None:
         shipped = load_policy(shipped_folder(ENV, "fleet"))
-        super().__init__(**{part.name: getattr(shipped, part.name) for part in fields(shipped) if part.init})
+        given = {part.name: getattr(shipped, part.name) for part in fields(shipped) if part.init}
+        super().__init__(**given | {"least_gain": 0.0, "wary": False})
         self.paid: Array | None = None
         self.rows: list[tuple[Array, ...]] = []
 

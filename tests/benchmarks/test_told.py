@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from benchmarks.envs import job_memory
+from benchmarks.envs import job_memory, risk
 from benchmarks.envs.job_memory import ENV, FLEET, Keeping
 from benchmarks.envs.told import MIXED, Mixed, Sensed, Told, Watched, _mixed
 from chaosgym.control.controllers.controller import added, place_of, seen
@@ -63,3 +63,15 @@ def test_jobs_are_compared_in_pairs(monkeypatch, tmp_path):
     assert later["job"] == "2 to 3"
     assert len((tmp_path / "kept.jsonl").read_text().splitlines()) == 3
     assert len(job_memory.lines([first, later])) == 4
+
+
+def test_rules_are_compared_in_pairs(monkeypatch):
+    """The first one is the reference, another is not it, and one that goes for no gain follows."""
+    monkeypatch.setattr(risk, "FLEET", risk.FLEET | {"steps": 8})
+    monkeypatch.setattr(risk, "RULES", [(False, 0.0), (True, 0.05), (False, 1e3)])
+    rows = risk.risk(4)
+    first, wary, never = (row["less_follow"]["more"] for row in rows)
+    assert never == 0.0
+    assert rows[0]["less_first"]["more"] == 0.0
+    assert len({first, wary, never}) == 3
+    assert len(risk.lines(rows)) == 5
