@@ -16,7 +16,9 @@ from chaosgym.control.rollout import play
 from chaosgym.control.scores import MADE_WORSE, difference
 from chaosgym.control.statistics import paired_difference
 
-ENV, FLEET = "chaosgym/ImpactBeamTolerance-v1", {"level": "fleet", "split": "train"}
+ENV = "chaosgym/ImpactBeamTolerance-v1"
+
+FLEET: Mapping[str, Any] = {"level": "fleet", "split": "train"}
 
 FIRST_SEED = 28_000_000
 
