@@ -89,7 +89,7 @@ def test_simulated_peaks_are_read_back(tmp_path):
         assert [one["column"] for one in both["recordings"]] == ["upper", "lower"]
         code, _, err = run("overlay", "impact-beam", path, "--out", tmp_path / "o.png")
         assert code == 2
-        assert "'upper', 'lower'; use --column NAME" in err
+        assert "'upper', 'lower'; state --read column=NAME" in err
         for command in COMMANDS:
             code, out, err = run(*command, path, "--read", "column=upper", "--json")
             assert code == 0, err
@@ -367,7 +367,7 @@ def test_a_measured_sweep_is_told_by_types(tmp_path):
         ("speed,rpm,peak\n1,2,3\n4,5,6\n", ("--sensor-error", "3 N"), "several columns that could be the speed"),
         ("speed,peak\n1,2\nx,4\n", ("--sensor-error", "3 N"), "line 3: 'x'"),
         ("speed,peak\n1,-2\n1,3\n", ("--sensor-error", "3 N"), "is a negative force"),
-        ("speed [Hz]\n1\n2\n", ("--sensor-error", "3 N"), "--column NAME"),
+        ("speed [Hz]\n1\n2\n", ("--sensor-error", "3 N"), "--read column=NAME"),
         ("", ("--sensor-error", "3 N"), "holds no numbers"),
     ],
 )
@@ -422,7 +422,10 @@ def test_an_acceleration_is_judged_in_its_own_unit(tmp_path):
     assert "in mV, the readings are in g" in err
     code, _, err = run("judge", path, "--load-rating", "500 N")
     assert code == 2
-    assert f"asks for a force; name a column of one by --column, or judge it as it is: chaosgym judge {path}" in err
+    assert (
+        f"asks for a force; name a column of one by --read column=NAME, or judge it as it is: chaosgym judge {path}"
+        in err
+    )
     assert run("judge", path, "--load-rating", "500 N", "--read", "scale=0.02 g/N")[0] == 0
     code, out, _ = run("judge", path, "--read", "scale=0.02 g/N")
     assert code == 0
@@ -461,7 +464,7 @@ def test_columns_are_named_by_patterns_lists_and_numbers(recordings):
     assert "columns 'front', 'rear' are compared with surfaces of impact-beam; allowed: upper, lower" in err
     code, _, err = run("judge", recordings / "a.csv", "--column", "*", "--load-rating", "500 N")
     assert (code, err.count("\n")) == (2, 1)
-    assert "--column '*' means 'front', 'rear'; allowed here: one column" in err
+    assert "column='*' means 'front', 'rear'; allowed here: one column" in err
 
 
 def test_a_folder_or_a_pattern_gives_a_table(recordings):

@@ -131,7 +131,9 @@ def test_what_is_no_force_by_its_title_is_never_taken_for_one(title, tmp_path):
         choose_force(recording, scale="50 N/FS")
     with pytest.raises(DiagnosisError, match=r"scale = '100 mV/N'|leave unit=V out"):
         choose_force(recording, unit="V", scale="100 mV/N")
-    with pytest.raises(DiagnosisError, match="this asks for a force; name a column of one by --column, or judge it"):
+    with pytest.raises(
+        DiagnosisError, match="this asks for a force; name a column of one by --read column=NAME, or judge it"
+    ):
         ask_for_force("a", choose_force(recording))
 
 

@@ -93,8 +93,11 @@ MANY = "\n".join(",".join(row) for row in ([f"c{k}" for k in range(1000)], ["1"]
         ("peak force [N]\n", "no numbers"),
         ("", "no numbers"),
         ("a [N],a [N]\n1,2\n", "two columns alike"),
-        ("left [N],right [N]\n1,2\n3,1\n", "several columns that could be forces: 'left', 'right'; use --column"),
-        (MANY, r"could be forces: 'c0', .* 'c11' and 988 more; use --column NAME"),
+        (
+            "left [N],right [N]\n1,2\n3,1\n",
+            "several columns that could be forces: 'left', 'right'; state --read column=NAME",
+        ),
+        (MANY, r"could be forces: 'c0', .* 'c11' and 988 more; state --read column=NAME"),
         ("cycle,rpm\n1,1140\n2,1141\n3,1139\n", "no column that could be a force"),
         ("1\n2\n3\n4\n5\n6\n", "rises like a counter"),
         ("angle [deg]\n1\n2\n1\n", "no column that could be a force"),

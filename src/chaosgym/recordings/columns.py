@@ -199,13 +199,15 @@ def choose_force(
         if len(names) > 1:
             raise DiagnosisError(
                 f"{recording.source} has several columns that could be forces: {_first(list(map(repr, names)), ', ')}; "
-                "use --column NAME"
+                "state --read column=NAME"
             )
         if not names:
             told = {name: _speaks_against(recording, name) for name in recording.columns} | dict(recording.texts)
             unread = {f"{name!r}, {recording.problems[name]}" for name in recording.problems.keys() - told.keys()}
             why = _first([*(f"{name!r} {reason}" for name, reason in told.items()), *sorted(unread)], "; ")
-            raise DiagnosisError(f"{recording.source} has no column that could be a force ({why}); use --column NAME")
+            raise DiagnosisError(
+                f"{recording.source} has no column that could be a force ({why}); state --read column=NAME"
+            )
         name = names[0]
     else:
         name = named_column(recording, column)

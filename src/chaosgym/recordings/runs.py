@@ -180,7 +180,7 @@ def judged_run(source: str | Path, options: RecordingOptions | None = None, *, t
     runs = judged_runs(source, options, of_force=True, traced=traced)
     if len(runs) > 1:
         names = ", ".join(repr(run.name) for run in runs)
-        raise DiagnosisError(f"--column {options.column!r} means {names}; allowed here: one column")
+        raise DiagnosisError(f"column={options.column!r} means {names}; allowed here: one column")
     return runs[0]
 
 
@@ -267,7 +267,7 @@ def ask_for_force(source: str, signal: Signal) -> None:
     if signal.unit == "N":
         return
     electric = signal.unit in VOLTS or signal.unit in ("A", "mA", "FS")
-    judge = f"name a column of one by --column, or judge it as it is: chaosgym judge {source}"
+    judge = f"name a column of one by --read column=NAME, or judge it as it is: chaosgym judge {source}"
     cure = f"state --read scale='100 {signal.unit}/N', if it measures one" if electric else judge
     held = f"is of {other_quantity(signal.name)}" if signal.unit == UNKNOWN else f"is in {signal.unit}"
     raise DiagnosisError(f"{source}: column {signal.name!r} {held}, and this asks for a force; {cure}")

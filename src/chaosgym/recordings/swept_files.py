@@ -122,7 +122,7 @@ def _columns(
     ask_for_force(recording.source, force)
     if speed.name == force.name:
         raise DiagnosisError(
-            f"{recording.source}: column {speed.name!r} can't be both speed and force; use --column NAME"
+            f"{recording.source}: column {speed.name!r} can't be both speed and force; state --read column=NAME"
         )
     if len(speed.values) != len(force.values):
         raise DiagnosisError(
