@@ -10,6 +10,7 @@ import argparse
 from pathlib import Path
 from typing import Any
 
+import learn_extra  # noqa: F401
 import numpy as np
 import torch
 from numpy.typing import NDArray

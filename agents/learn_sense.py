@@ -14,6 +14,7 @@ import time
 from pathlib import Path
 from typing import Any, NamedTuple
 
+import learn_extra  # noqa: F401
 import numpy as np
 import torch
 from numpy.typing import NDArray

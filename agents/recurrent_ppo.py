@@ -9,6 +9,7 @@ The same command goes on with a run that was interrupted, and ends as if it had 
 import argparse
 from pathlib import Path
 
+import learn_extra  # noqa: F401
 import torch
 from sb3_contrib import RecurrentPPO
 from stable_baselines3.common.vec_env import VecMonitor, VecNormalize

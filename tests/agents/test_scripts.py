@@ -25,6 +25,18 @@ SMALL = ("--envs", "32", "--rollout", "60", "--batch", "240")
 SCRIPTS = ("ppo", "recurrent_ppo", "learn_map", "learn_sense")
 
 
+@pytest.mark.parametrize("script", [*SMALL, "learn_map", "learn_sense"])
+@pytest.mark.parametrize("package", ["torch", "stable_baselines3"])
+def test_a_script_without_its_packages_names_the_extra(script, package, monkeypatch):
+    """It ends with one line, before anything else is loaded."""
+    monkeypatch.syspath_prepend(AGENTS)
+    monkeypatch.setitem(sys.modules, package, None)
+    monkeypatch.delitem(sys.modules, "learn_extra", raising=False)
+    with pytest.raises(SystemExit) as ended:
+        runpy.run_path(str(AGENTS / f"{script}.py"))
+    assert str(ended.value).startswith("Error: training needs the extra [learn]: pip install '.[learn]'")
+
+
 def _train(script, out, steps, *options):
     command = [sys.executable, AGENTS / f"{script}.py", "--steps", steps, "--out", out, *options]
     done = subprocess.run([str(part) for part in command], capture_output=True, text=True, check=False)
