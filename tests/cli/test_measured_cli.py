@@ -392,17 +392,17 @@ def test_the_unit_of_a_column_is_asked_for_where_it_is_unknown():
 
 @pytest.mark.parametrize(
     ("error", "stated"),
-    [("0.05 m/s2", 0.05), ("0.05 m/s^2", 0.05), ("5e-2m/s²", 0.05), ("0.05g", 0.49), ("0.05 g", 0.49)],
+    [("0.05 m/s2", 0.05), ("0.05 m/s^2", 0.05), ("5e-2m/s²", 0.05), ("0.05g", 0.49), ("50 mg", 0.49)],
 )
-@pytest.mark.parametrize("unit", ["m/s^2", "m/s²", "g"])
-def test_the_error_of_a_sensor_is_understood_in_every_spelling(unit, error, stated):
+@pytest.mark.parametrize(("unit", "size"), [("m/s^2", 1.0), ("m/s²", 1.0), ("g", 9.80665), ("mg", 9.80665e-3)])
+def test_the_error_of_a_sensor_is_understood_in_every_spelling(unit, size, error, stated):
     """Half a hundredth of g is 0.49 m/s², in readings of either unit."""
     rng = np.random.default_rng(0)
     readings = "".join(f"{a:.6f}\n" for a in 3.0 + 0.001 * rng.normal(size=60))
     code, out, err = run("judge", "-", "--sensor-error", error, "--json", stdin=f"acc [{unit}]\n{readings}")
     assert code == 0, err
     told = json.loads(out)["sensor_error"]["half_width"]
-    assert told == pytest.approx(stated / (9.80665 if unit == "g" else 1.0), rel=1e-2)
+    assert told == pytest.approx(stated / size, rel=1e-2)
 
 
 def test_an_acceleration_is_judged_in_its_own_unit(tmp_path):

@@ -123,8 +123,8 @@ def in_readings(size: float | None, unit: str) -> float | None:
     Examples
     --------
     >>> from chaosgym.recordings.kind import InUnit, in_readings
-    >>> in_readings(InUnit(0.1, "g"), "m/s^2")
-    0.980665
+    >>> in_readings(InUnit(0.1, "g"), "m/s^2"), in_readings(InUnit(50.0, "mg"), "g")
+    (0.980665, 0.05)
     """
     stated = getattr(size, "unit", unit)
     if size is not None and stated != unit:

@@ -18,7 +18,7 @@ VOLTS = {"V": 1.0, "mV": 1e-3, "µV": 1e-6, "uV": 1e-6}
 SPEEDS = ("Hz", "rpm", "1/min", "min-1", "rad/s")
 """Units of a speed."""
 
-_OTHERS = "g m/s² m/s2 m/s^2 m/s mm/s in/s m mm um µm in mil Pa kPa MPa bar psi V mV µV uV A mA Nm N·m FS kg gram"
+_OTHERS = "g mg m/s² m/s2 m/s^2 m/s mm/s in/s m mm um µm in mil Pa kPa MPa bar psi V mV µV uV A mA Nm N·m FS kg gram"
 OTHERS = frozenset(_OTHERS.split())
 """Units of quantities that are judged in their own unit."""
 
@@ -29,7 +29,7 @@ UNITS = frozenset({*FORCES, *TIMES, *RATES, *SPEEDS, *OTHERS, *_NEVER_JUDGED}) -
 SIZES: Mapping[str, Mapping[str, float]] = {
     "force": FORCES,
     "time": TIMES,
-    "acceleration": {"g": 9.80665, "m/s²": 1.0, "m/s2": 1.0, "m/s^2": 1.0},
+    "acceleration": {"g": 9.80665, "mg": 9.80665e-3, "m/s²": 1.0, "m/s2": 1.0, "m/s^2": 1.0},
     "velocity": {"m/s": 1.0, "mm/s": 1e-3, "in/s": 25.4e-3},
     "displacement": {**ALTERNATIVES["m"], "µm": 1e-6},
     "pressure": {"Pa": 1.0, "kPa": 1e3, "MPa": 1e6, "bar": 1e5, "psi": 6894.757293168},
