@@ -346,14 +346,45 @@ def test_other_settings_and_foreign_folders_are_refused(swept, tmp_path):
 
 def test_types_that_take_long_are_left_to_the_user(tmp_path, monkeypatch):
     """The choice is made by the expected time, and a folder keeps the choice that it was begun with."""
-    plan = SweepPlan(PLAIN_BEAM, (Axis("excitation_frequency", 10.0, 20.0, 3),))
-    monkeypatch.setattr(types_by_default, "full_type", lambda machine, plan: None)
+    plan = SweepPlan(PLAIN_BEAM, (Axis("excitation_frequency", 10.0, 20.0, 30),))
+    monkeypatch.setattr(types_by_default, "full_type", lambda machine, plan: {"full_response_type": "I"})
     quick = types_by_default.with_affordable_types(plan, tmp_path)
     assert quick.plan.full_types == 1.0
-    assert quick.seconds < 1.0
+    assert quick.timed.seconds < 1.0
+    assert len(quick.timed.known) == types_by_default.TIMED + 1
     monkeypatch.setattr(types_by_default, "AFFORDABLE", 0.0)
     slow = types_by_default.with_affordable_types(plan, tmp_path)
     assert slow.plan == plan
-    assert slow.seconds > 0.0
+    assert len(slow.timed.known) == types_by_default.ENOUGH + 1
     SweepFolder(tmp_path, quick.plan, "1")
     assert types_by_default.with_affordable_types(plan, tmp_path) == (quick.plan, None)
+
+
+def test_the_told_time_of_types_is_that_of_points_all_over_the_plan(monkeypatch):
+    """Points that differ in cost a hundredfold along either axis are met in about their shares."""
+    axes = (Axis("excitation_frequency", 18.0, 30.0, 25), Axis("clearance", 0.1e-3, 0.14e-3, 3))
+    plan, clock = replace(PLAN, axes=axes, full_types=1.0), [0.0]
+
+    def timed(machine, plan):
+        clock[0] += 10.0 if machine.excitation_frequency > 24.0 and machine.clearance > 0.11e-3 else 0.1
+        return {"full_response_type": "I"}
+
+    monkeypatch.setattr(types_by_default, "full_type", timed)
+    monkeypatch.setattr(types_by_default, "process_time", lambda: clock[0])
+    told = types_by_default.timed_types(plan).seconds * len(plan)
+    clock[0] = 0.0
+    for row in range(len(plan)):
+        timed(plan.machine_at({name: column[0] for name, column in plan.points(range(row, row + 1)).items()}), plan)
+    assert clock[0] / 1.5 < told < clock[0] * 1.5
+
+
+def test_types_that_were_timed_are_kept(tmp_path, monkeypatch):
+    """The sweep takes them as they are, and computes the others."""
+    plan = SweepPlan(PLAIN_BEAM, (Axis("excitation_frequency", 10.0, 12.0, 5),), full_types=1.0)
+    asked = []
+    monkeypatch.setattr(
+        label_module, "full_type", lambda machine, plan: asked.append(machine) or {"full_response_type": "II"}
+    )
+    sweep = run_sweep(plan, tmp_path / "s", workers=1, known={2: {"full_response_type": "I"}})
+    assert sweep.column("full_response_type").tolist() == ["II", "II", "I", "II", "II"]
+    assert len(asked) == 4

@@ -9,7 +9,7 @@ import click
 from chaosgym.cli import Group
 from chaosgym.cli.machine_options import machine_command, millimetres_meant, model_over
 from chaosgym.cli.options import Fact, IntRange, stated
-from chaosgym.cli.output import AS_JSON, DIAGNOSED, announce, emit, picture_path, plot_option
+from chaosgym.cli.output import AS_JSON, DIAGNOSED, announce, emit, patience, picture_path, plot_option
 
 SAMPLED = 9
 """Points of the sweep by which its one model is chosen."""
@@ -121,7 +121,7 @@ def sweep(
     from chaosgym.sweeps import Axis, SweepPlan, run_sweep
     from chaosgym.sweeps.info import calm_region_of
     from chaosgym.sweeps.plan import default_axes
-    from chaosgym.sweeps.types_by_default import AFFORDABLE, seconds_of_a_type, with_affordable_types
+    from chaosgym.sweeps.types_by_default import timed_types, with_affordable_types
     from chaosgym.units import duration
 
     picture = picture_path(plot, f"sweep-{machine.name}")
@@ -142,16 +142,22 @@ def sweep(
         continuous_field(machine, chosen[0].field)  # refused before the sweep, not after
     for text in axes:
         _note_millimetres(machine, text)
+    timed = None
     if "full_types" not in label:
-        plan, seconds = with_affordable_types(plan, out, threads)
-        if seconds and seconds > AFFORDABLE:
-            needed = f"{duration(seconds)}: --label full-types=1"
+        with patience("sweep: time a few types"):
+            plan, timed = with_affordable_types(plan, out, threads)
+        if timed and not plan.full_types:
+            needed = f"{duration(timed.seconds * len(plan), 2)} of processor time: --label full-types=1"
             click.echo(f"types of {len(plan)} points would take about {needed}", err=True)
+    known = None
     if not Path(out).exists():
-        types = plan.full_types * len(plan)
-        besides = types * seconds_of_a_type(plan) if types else 0.0
+        besides = 0.0
+        if plan.full_types:
+            with patience("sweep: time a few types"):
+                known, seconds = timed or timed_types(plan, threads)
+            besides = seconds * (plan.full_types * len(plan) - len(known))
         announce("sweep", plan.machine, DIAGNOSED * len(plan) * plan.budget, besides=besides)
-    labelled = run_sweep(plan, out, workers=threads, scheduler=scheduler, repair=repair, progress=True)
+    labelled = run_sweep(plan, out, workers=threads, scheduler=scheduler, repair=repair, progress=True, known=known)
     counts = {
         name: dict(Counter(str(value) for value in labelled.column(name)))
         for name in ("nature", "response_type", *(["full_response_type"] if plan.full_types else []), "status")

@@ -2,6 +2,7 @@
 
 import platform
 import subprocess
+from collections.abc import Mapping
 from functools import cache
 from importlib.metadata import version
 from pathlib import Path
@@ -141,8 +142,12 @@ def full_type(machine: Machine, plan: SweepPlan) -> dict[str, Any]:
     return {"full_response_type": found.type, "motions": len(found.attractors.motions), "other_motions": told}
 
 
-def label_rows(plan: SweepPlan, rows: range, stop: Event | None = None) -> pa.Table:
+def label_rows(
+    plan: SweepPlan, rows: range, stop: Event | None = None, known: Mapping[int, dict[str, Any]] | None = None
+) -> pa.Table:
     """Label some rows of a plan; response types that rest on neighbours are left to the end of the sweep.
+
+    ``known`` has types by runs of their own that need not be computed again.
 
     Raises
     ------
@@ -165,7 +170,7 @@ def label_rows(plan: SweepPlan, rows: range, stop: Event | None = None) -> pa.Ta
         if not with_signals[index]:
             label = {name: value for name, value in label.items() if name not in signals}
         if with_full_type[index]:
-            label |= full_type(machine, plan)
+            label |= (known or {}).get(rows[index]) or full_type(machine, plan)
         lines.append(fixed | point | label)
     if plan.sampling == "crosses":
         for line, number, part in zip(lines, plan.machine_numbers(rows), plan.splits(rows), strict=True):

@@ -42,11 +42,27 @@ DEFAULT_BUDGET = 400
 CHUNK_SIZE = 256
 """Points that are computed and kept together; of crosses the whole ones among them."""
 
+PARTS, SMALLEST_CHUNK = 64, 4
+"""Where each point has a type by runs of its own: chunks of a plan, which threads share, and fewest points of one."""
+
 SPLIT = (("train", 0.70), ("validation", 0.15), ("test", 0.15))
 """Shares of the machines of crosses."""
 
 GOLDEN, SILVER = 0.6180339887498949, 0.41421356237309515
 """Multiples of an irrational number spread evenly: which rows have signals, and which a type over the full window."""
+
+
+def spread(size: int) -> list[int]:
+    """Numbers below ``size`` in an order of which each beginning is spread over all of them.
+
+    Examples
+    --------
+    >>> from chaosgym.sweeps.plan import spread
+    >>> spread(8)
+    [0, 5, 2, 7, 4, 1, 6, 3]
+    """
+    order: list[int] = np.argsort(np.argsort(np.arange(size) * GOLDEN % 1.0)).tolist()
+    return order
 
 
 @dataclass(frozen=True)
@@ -163,7 +179,8 @@ class SweepPlan:
     def chunk_size(self) -> int:
         """Points that are computed and kept together."""
         together = len(CROSS) if self.sampling == "crosses" else 1
-        return CHUNK_SIZE // together * together
+        size = max(SMALLEST_CHUNK, len(self) // PARTS) if self.full_types == 1.0 else CHUNK_SIZE
+        return max(together, min(size, CHUNK_SIZE) // together * together)
 
     def chunks(self) -> list[range]:
         """Rows of every chunk."""

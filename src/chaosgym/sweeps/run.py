@@ -2,7 +2,7 @@
 
 import json
 import logging
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterable, Iterator, Mapping
 from concurrent.futures import FIRST_COMPLETED, CancelledError, Future, ThreadPoolExecutor, wait
 from contextlib import contextmanager, nullcontext
 from itertools import islice
@@ -19,10 +19,11 @@ from chaosgym.simulation.parallel import number_of_workers
 from chaosgym.sweeps.dataset import LabelledSweep, read_sweep
 from chaosgym.sweeps.folder import CHUNK_FOLDER, PLAN_FILE, SweepFolder
 from chaosgym.sweeps.label import label_rows
-from chaosgym.sweeps.plan import SweepPlan
+from chaosgym.sweeps.plan import SweepPlan, spread
 from chaosgym.version import __version__
 
 Finished = tuple[range, pa.Table]
+Types = Mapping[int, dict[str, Any]]
 
 AHEAD = 4
 """Chunks handed out for each thread of a cluster, the running ones included."""
@@ -30,17 +31,19 @@ AHEAD = 4
 CONNECT_SECONDS = 15
 
 
-def on_threads(plan: SweepPlan, chunks: Iterable[range], threads: int) -> Iterator[Finished]:
+def on_threads(
+    plan: SweepPlan, chunks: Iterable[range], threads: int, known: Types | None = None
+) -> Iterator[Finished]:
     """Label chunks on threads of this process."""
     waiting, stop = iter(chunks), Event()
     pool = ThreadPoolExecutor(max_workers=threads)
     try:
-        running = {pool.submit(label_rows, plan, rows, stop): rows for rows in islice(waiting, 2 * threads)}
+        running = {pool.submit(label_rows, plan, rows, stop, known): rows for rows in islice(waiting, 2 * threads)}
         while running:
             done: set[Future[pa.Table]] = wait(running, return_when=FIRST_COMPLETED).done
             for future in done:
                 rows = running.pop(future)
-                running |= {pool.submit(label_rows, plan, rows, stop): rows for rows in islice(waiting, 1)}
+                running |= {pool.submit(label_rows, plan, rows, stop, known): rows for rows in islice(waiting, 1)}
                 yield rows, future.result()
     finally:
         stop.set()  # after Ctrl-C, chunks end with the row that they are at
@@ -108,6 +111,7 @@ def run_sweep(
     scheduler: str | None = None,
     repair: bool = False,
     progress: bool = False,
+    known: Types | None = None,
 ) -> LabelledSweep:
     """Label every point of a plan and keep the result in a folder.
 
@@ -128,6 +132,8 @@ def run_sweep(
         Compute damaged chunks again, rather than name them and stop.
     progress
         Show a progress bar on standard error.
+    known
+        Types of some rows by runs of their own that need not be computed again; a cluster computes them all.
 
     Raises
     ------
@@ -155,8 +161,9 @@ def run_sweep(
     ):
         store = SweepFolder(folder, plan, __version__)
         missing = store.missing(repair=repair)
+        missing = [missing[place] for place in spread(len(missing))]  # so that the time left follows from those done
         if missing:
-            done = on_cluster(plan, missing, client) if client else on_threads(plan, missing, threads)
+            done = on_cluster(plan, missing, client) if client else on_threads(plan, missing, threads, known)
             _keep(store, missing, done, progress)
         if not store.data.is_file():
             store.finish()
@@ -167,7 +174,8 @@ def _keep(store: SweepFolder, missing: list[range], done: Iterable[tuple[range, 
     """Keep every chunk as it is done."""
     size = len(store.plan)
     first = size - sum(len(rows) for rows in missing)
-    with tqdm(total=size, initial=first, desc="sweep", unit="point", disable=not progress, mininterval=1.0) as bar:
+    shown = {"desc": "sweep", "unit": "point", "mininterval": 1.0, "smoothing": 0.0, "disable": not progress}
+    with tqdm(total=size, initial=first, **shown) as bar:
         for rows, table in done:
             _check_version(table)
             store.keep(rows, table)

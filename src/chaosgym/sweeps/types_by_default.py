@@ -1,36 +1,51 @@
-"""Whether a coarse grid's points are typed by runs of their own, where nobody said.
+"""Whether a coarse grid's points are typed by runs of their own, where nobody said, and how long that takes.
 
 On a fine grid a type rests on the neighbours. Where the steps are wider than the tolerances it needs further runs. A
-map is read for its types, so they are computed where that is expected to take less than a minute.
+map is read for its types, so they are computed where that is expected to take less than a minute. A few points spread
+over the plan are timed; what they give is kept.
 """
 
+import math
+from collections.abc import Mapping
 from dataclasses import replace
 from os import cpu_count
 from pathlib import Path
 from time import process_time
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 
+from chaosgym.errors import ParameterError
+from chaosgym.simulation.parallel import parallel_map
 from chaosgym.sweeps.folder import PLAN_FILE, read_plan_file
 from chaosgym.sweeps.label import full_type
-from chaosgym.sweeps.plan import SweepPlan
+from chaosgym.sweeps.plan import SweepPlan, spread
 
 AFFORDABLE = 60.0
 """Seconds that types may take by default."""
 
-TIMED = 4
-"""Points that are timed at the most, after one that warms up."""
+TIMED = 24
+"""Points that are timed, after one that warms up: types of one grid differ in cost by a factor of ten and more."""
 
-PATIENCE = 3.0
-"""Seconds after which no further point is timed."""
+ENOUGH = 4
+"""Points after which timing ends if types are far from affordable, for these points are then of no use."""
+
+FAR = 2.0
+"""Multiple of what is affordable that is far from it."""
+
+
+class TimedTypes(NamedTuple):
+    """Types of a few points by their rows, and the mean processor time of one [s], that of other programs left out."""
+
+    known: Mapping[int, dict[str, Any]]
+    seconds: float
 
 
 class TypesByDefault(NamedTuple):
-    """A plan with its choice, and how long all types were expected to take [s]; None where nothing was timed."""
+    """A plan with its choice, and the types that were timed for it; None where nothing was timed."""
 
     plan: SweepPlan
-    seconds: float | None
+    timed: TimedTypes | None
 
 
 def with_affordable_types(plan: SweepPlan, folder: str | Path, workers: int | None = None) -> TypesByDefault:
@@ -59,19 +74,34 @@ def with_affordable_types(plan: SweepPlan, folder: str | Path, workers: int | No
     if held.is_file():
         share = read_plan_file(held).get("full_types")
         return TypesByDefault(replace(plan, full_types=1.0) if share == 1.0 else plan, None)
-    seconds = seconds_of_a_type(plan) * len(plan) / (workers or cpu_count() or 1)
-    return TypesByDefault(replace(plan, full_types=1.0) if seconds <= AFFORDABLE else plan, seconds)
+    affordable = AFFORDABLE * (workers or cpu_count() or 1) / len(plan)
+    typed = replace(plan, full_types=1.0)
+    timed = timed_types(typed, workers, affordable)
+    return TypesByDefault(typed if timed.seconds <= affordable else plan, timed)
 
 
-def seconds_of_a_type(plan: SweepPlan) -> float:
-    """Mean processor time [s] of a few types, spread over the grid: that of other programs does not count."""
-    rows = np.linspace(0, len(plan) - 1, TIMED + 2).round().astype(int)[1:].tolist()
-    took = list[float]()
-    for row in rows:
-        begun = process_time()
-        point = {name: float(column[0]) for name, column in plan.points(range(row, row + 1)).items()}
-        full_type(plan.machine_at(point), plan)
-        took.append(process_time() - begun)
-        if sum(took) > PATIENCE:
+def timed_types(plan: SweepPlan, workers: int | None = None, affordable: float = math.inf) -> TimedTypes:
+    """Types of a few points of a plan that have one; fewer where one takes far more than an ``affordable`` time [s]."""
+    typed = np.flatnonzero(plan.with_full_type(range(len(plan))))
+    rows = typed[spread(len(typed))[: TIMED + 1]].tolist()
+    known, seconds, counted = _typed(plan, rows[:1], workers), 0.0, 0
+    for part in (rows[1 : ENOUGH + 1], rows[ENOUGH + 1 :]):
+        if counted and seconds > FAR * affordable * counted:
             break
-    return float(np.mean(took[1:] or took))
+        begun = process_time()
+        known |= _typed(plan, part, workers)
+        seconds, counted = seconds + process_time() - begun, counted + len(part)
+    return TimedTypes(known, seconds / max(counted, 1))
+
+
+def _typed(plan: SweepPlan, rows: list[int], workers: int | None) -> dict[int, dict[str, Any]]:
+    """Types of some rows; none where there is no machine, of which the sweep says so in its row."""
+
+    def one(row: int) -> dict[str, Any]:
+        point = {name: float(column[0]) for name, column in plan.points(range(row, row + 1)).items()}
+        try:
+            return full_type(plan.machine_at(point), plan)
+        except ParameterError:
+            return {}
+
+    return dict(zip(rows, parallel_map(one, rows, workers=workers), strict=True))
