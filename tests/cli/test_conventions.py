@@ -130,7 +130,7 @@ def test_a_warning_is_one_line():
 def test_the_help_of_a_machine_names_its_models(machine, rungs, tmp_path, monkeypatch):
     """What ``--fidelity`` takes depends on the machine, so that the help names what this one takes."""
     monkeypatch.chdir(tmp_path)
-    (tmp_path / "own.toml").write_text(run("new-machine")[1])
+    (tmp_path / "own.toml").write_text(run("new-machine", "modes")[1])
     told = " ".join(run("simulate", machine, "--help")[1].split())
     assert f"is allowed ('1 %'), or {'one of ' if ', ' in rungs else ''}{rungs}" in told
     assert run("simulate", machine, "--cycles", "1", "--fidelity", rungs.split(", ")[0].strip(","))[0] == 0

@@ -36,7 +36,7 @@ def machine_of(kind, folder):
     if kind in ("impact-beam", "slider-crank"):
         return kind
     path = str(folder / f"{kind}.toml")
-    assert run("new-machine", *([] if kind == "own" else [kind]), "--out", path)[0] == 0
+    assert run("new-machine", "modes" if kind == "own" else kind, "--out", path)[0] == 0
     return path
 
 

@@ -90,7 +90,7 @@ def test_link_and_python_give_the_same_machine():
 def test_a_machine_by_file_is_shown_and_taken_along(tmp_path):
     """One's own machine has sliders, link and Python; no link opens the file of another."""
     path = tmp_path / "own.toml"
-    path.write_text(CliRunner().invoke(app, ["new-machine"]).stdout)
+    path.write_text(CliRunner().invoke(app, ["new-machine", "modes"]).stdout)
     kind = MACHINES[str(path)]
     machine = kind(clearance=0.9 * kind().clearance)
     assert len(sliders_of(machine)) == 3

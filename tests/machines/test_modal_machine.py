@@ -372,11 +372,11 @@ def test_commands_and_environments_take_the_file(machine_file, tmp_path):
 def test_new_machine_writes_the_template_once(tmp_path):
     """The command prints the template or the schema, and never writes over a file."""
     run = CliRunner().invoke
-    assert run(app, ["new-machine"]).stdout == template()
+    assert run(app, ["new-machine"]).stdout == template("mass")
     assert run(app, ["new-machine", "--schema"]).stdout == schema_text()
     path = tmp_path / "mine.toml"
     assert str(path) in run(app, ["new-machine", "--out", str(path)]).stdout
-    assert path.read_text() == template()
+    assert path.read_text() == template("mass")
     assert "exists already" in run(app, ["new-machine", "--out", str(path)]).output
 
 

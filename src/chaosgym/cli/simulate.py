@@ -162,12 +162,15 @@ def show(machine: Any, markdown: bool, plot: str | None, as_json: bool) -> None:
 
 
 @click.command("new-machine")
-@click.argument("kind", default="modes", metavar="[modes|four-bar|slider-crank|compressor]")
+@click.argument("kind", default="mass", metavar="[mass|modes|four-bar|slider-crank|compressor]")
 @click.option("--out", type=click.Path(dir_okay=False, path_type=Path), help="New file; standard output by default.")
 @click.option("--schema", is_flag=True, help="The JSON schema of such files instead, for editors.")
 @AS_JSON
 def new_machine(kind: str, out: Path | None, schema: bool, as_json: bool) -> None:
-    """Print the commented file of a machine: of modes or matrices with gaps, or a mechanism of links and joints."""
+    """Print the commented file of a machine, of a mass between two stops by default.
+
+    "modes" has every key of modes or matrices with gaps; the others are mechanisms of links and joints.
+    """
     from chaosgym.files import write_atomically
     from chaosgym.machines.machine_file import schema_text, template
 

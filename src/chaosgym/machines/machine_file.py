@@ -21,6 +21,7 @@ LARGEST = 1_000_000_000
 """Bytes that a file beside a machine's may have."""
 
 TEMPLATES: Mapping[str, tuple[str, str]] = {
+    "mass": ("chaosgym.machines.modal_machine", "mass.toml"),
     "modes": ("chaosgym.machines.modal_machine", "template.toml"),
     "four-bar": ("chaosgym.machines.mechanism", "four-bar.toml"),
     "slider-crank": ("chaosgym.machines.mechanism", "slider-crank.toml"),
