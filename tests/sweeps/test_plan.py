@@ -203,6 +203,12 @@ def test_bad_axes_are_refused(text, message):
         Axis.parse(text)
 
 
+def test_an_axis_with_a_unit_and_no_field_names_the_nearest():
+    """It is of the form, so the message is about the field."""
+    with pytest.raises(ParameterError, match=r"^axis 'sped' is no field; did you mean speed"):
+        Axis.parse("sped=5Hz:30Hz:6", {"excitation_frequency": "Hz"})
+
+
 def test_an_unknown_scale_is_refused():
     """Steps are even in the value or in its logarithm."""
     with pytest.raises(ParameterError, match="has scale 'sqrt'; allowed: lin, log"):

@@ -9,6 +9,7 @@ import numpy as np
 
 from chaosgym.arrays import Array
 from chaosgym.errors import ParameterError
+from chaosgym.machines.parameters import USUAL, suggestion
 from chaosgym.numbers import number, whole
 from chaosgym.units import as_float, parse_option
 
@@ -56,6 +57,8 @@ class Axis:
         """Read ``FIELD=LOW:HIGH[:COUNT][:lin|log]``; ends may have units, whose fields' own ``units`` names."""
         try:
             field, span = text.split("=")
+            if units and field not in units:
+                raise ParameterError(f"axis {field!r} is no field{suggestion(field, [*USUAL, *units])}")
             parts = span.split(":")
             scale: Scale = "log" if parts[-1] == "log" else "lin"
             low, high, *more = parts[:-1] if parts[-1] in SCALES else parts
