@@ -13,6 +13,7 @@ import numpy as np
 import pytest
 
 import chaosgym
+from chaosgym.control.comparison import read_comparison
 from chaosgym.control.policies import load_policy
 from chaosgym.control.rollout import play
 from chaosgym.envs.sense import STATISTICS, load_sense
@@ -110,6 +111,26 @@ def test_a_map_is_learned_from_the_jobs_of_several_runs(tmp_path):
         )
         assert done.returncode == 2
         assert told in done.stderr.splitlines()[-1]
+
+
+@pytest.mark.slow
+def test_a_sequence_model_learns_kept_jobs_and_plays(tmp_path):
+    """Held-out motion is told better after each part of the fit, and what it plays is added to a comparison once."""
+    fleet = ("--keywords", '{"level": "fleet", "split": "train"}')
+    _train("learn_map", tmp_path / "jobs", 3_840, *fleet, "--envs", "32", "--epochs", "1", "--units", "16")
+    command = [sys.executable, AGENTS / "learn_sequence.py", *fleet, "--jobs", tmp_path / "jobs", "--units", "16"]
+    command += ["--epochs", "30", "--out", tmp_path / "sequence", "--play", tmp_path / "test.parquet", "--machines", 4]
+    played = []
+    for _ in range(2):
+        done = subprocess.run([str(part) for part in command], capture_output=True, text=True, check=False)
+        assert done.returncode == 0, done.stderr
+        played.append((tmp_path / "test.parquet").read_bytes())
+    assert played[0] == played[1], "a second run neither fits nor plays anew"
+    rows = list(csv.DictReader((tmp_path / "sequence" / "progress.csv").read_text().splitlines()))
+    assert float(rows[-1]["irregular"]) < float(rows[0]["irregular"])
+    assert float(rows[-1]["decision"]) < np.log(17.0), "better than any speed of the band alike"
+    table = read_comparison(tmp_path / "test.parquet")
+    assert table.group_by("contender").aggregate([("machine", "count")])["machine_count"].to_pylist() == [4, 4]
 
 
 def test_a_constraint_is_the_budget_of_the_task(tmp_path, monkeypatch):
