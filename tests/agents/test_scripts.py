@@ -119,7 +119,18 @@ def test_a_sequence_model_learns_kept_jobs_and_plays(tmp_path):
     fleet = ("--keywords", '{"level": "fleet", "split": "train"}')
     _train("learn_map", tmp_path / "jobs", 3_840, *fleet, "--envs", "32", "--epochs", "1", "--units", "16")
     command = [sys.executable, AGENTS / "learn_sequence.py", *fleet, "--jobs", tmp_path / "jobs", "--units", "16"]
-    command += ["--epochs", "30", "--out", tmp_path / "sequence", "--play", tmp_path / "test.parquet", "--machines", 4]
+    command += [
+        "--epochs",
+        150,
+        "--learning-rate",
+        0.003,
+        "--out",
+        tmp_path / "sequence",
+        "--play",
+        tmp_path / "test.parquet",
+        "--machines",
+        4,
+    ]
     played = []
     for _ in range(2):
         done = subprocess.run([str(part) for part in command], capture_output=True, text=True, check=False)
