@@ -14,6 +14,7 @@ import time
 from pathlib import Path
 from typing import Any
 
+import learn_extra  # noqa: F401
 import numpy as np
 import torch
 from learn_map import LOAD_WEIGHT, Array, Jobs, gathered, rows_of, usual

@@ -26,7 +26,7 @@ SMALL = ("--envs", "32", "--rollout", "60", "--batch", "240")
 SCRIPTS = ("ppo", "recurrent_ppo", "learn_map", "learn_sense")
 
 
-@pytest.mark.parametrize("script", [*SMALL, "learn_map", "learn_sense"])
+@pytest.mark.parametrize("script", [*SCRIPTS, "sac", "constrained_ppo", "learn_sequence"])
 @pytest.mark.parametrize("package", ["torch", "stable_baselines3"])
 def test_a_script_without_its_packages_names_the_extra(script, package, monkeypatch):
     """It ends with one line, before anything else is loaded."""
