@@ -16,6 +16,7 @@ LONG = (
     "tests/golden/test_digests.py",
     "tests/uncompiled/test_uncompiled.py",
     "tests/test_kills.py",
+    "tests/test_own_machine_page.py",
     "tests/test_site.py",
     "tests/cli/test_answers.py",
     "tests/cli/test_full_disk.py",
