@@ -61,9 +61,9 @@ class Bodies(NamedTuple):
         pressed = (each for each in self.surfaces if self._phase(each, state) == PRESSED)
         return held + sum(each.energy(x) for each in pressed)
 
-    def balance(self, state, period, size):
+    def balance(self, state, period, size, steps=400):
         """State after a period, and work done, energy lost, and both without their signs; ``size`` of an energy."""
-        states, totals = self._run(state, [0.0, period], 1e-12, 400, 1e-13 * size)
+        states, totals = self._run(state, [0.0, period], 1e-12, steps, 1e-13 * size)
         return states[-1], *totals
 
     def _run(self, state, instants, tolerance, steps, small=None):
@@ -95,9 +95,14 @@ class Bodies(NamedTuple):
                     slope, (time, end), state, "DOP853", dense_output=True, events=events, rtol=tolerance,
                     atol=absolute, max_step=finest,
                 )  # fmt: skip
-                if not self._passed_over(run, phases):
+                passed = self._passed_over(run, phases)
+                if passed is None:
                     break
                 finest /= 8.0
+            else:
+                # it left by less than rounding: the event is between no two steps
+                phases[passed[0]] = passed[1]
+                continue
             while wanted and wanted[0] <= run.t[-1]:
                 found.append(run.sol(wanted.pop(0))[: 2 * n])
             time, state = run.t[-1], run.y[:, -1].copy()
@@ -112,18 +117,21 @@ class Bodies(NamedTuple):
         return np.array(found), state[2 * n :]
 
     def _passed_over(self, run, phases):
-        """Whether a surface was touched, or left, between the ends of steps, where events are looked for."""
-        shares = np.arange(1, 8) / 8.0
+        """(surface, phase) that one took, and left for, between the ends of steps, where events are looked for."""
+        n, shares = len(self.mass), np.arange(1, 8) / 8.0
         inside = (run.t[:-1, None] + np.diff(run.t)[:, None] * shares).ravel()
-        x = run.sol(inside)[: len(self.mass)]
-        for surface, phase in zip(self.surfaces, phases, strict=True):
-            depth = surface.row @ x - surface.at
-            bent = surface.row @ run.y[: len(self.mass), 0] - surface.at > 1e-12
+        states = run.sol(inside)
+        for number, (surface, phase) in enumerate(zip(self.surfaces, phases, strict=True)):
+            depth = surface.row @ states[:n] - surface.at
+            bent = surface.row @ run.y[:n, 0] - surface.at > 1e-12
             if phase == OPEN and np.max(depth, initial=0.0) > 1e-12:
-                return True
+                return number, PRESSED
             if phase == LEFT and bent and np.min(depth, initial=0.0) < -1e-12:
-                return True
-        return False
+                return number, OPEN
+            deep = np.flatnonzero(depth > 1e-12) if phase == LEFT else ()
+            if any(surface.force(*np.split(states[: 2 * n, k], 2)) > 1e-12 * surface.stiffness for k in deep):
+                return number, PRESSED
+        return None
 
     def _phase(self, surface, state):
         x, v = np.split(state, 2)

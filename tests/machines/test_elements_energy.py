@@ -97,7 +97,11 @@ def drawn(seed, hertzian=False):
     return "\n".join(text) + "\n", Bodies(np.diag(masses), damping, stiffness, pull, surfaces), force * gap
 
 
-def worst_gap(folder, seed, cycles=2, hertzian=False):
+FINER = 4000
+"""SciPy's fewest steps of a cycle where a touch shorter than one of 400 was missed."""
+
+
+def worst_gap(folder, seed, cycles=2, hertzian=False, steps=400):
     """Largest gap in the balance of a cycle against what is allowed, and the impacts of all."""
     text, bodies, size = drawn(seed, hertzian)
     (folder / "machine.toml").write_text(text)
@@ -107,16 +111,21 @@ def worst_gap(folder, seed, cycles=2, hertzian=False):
     q, v = np.split(np.array([*record.section, record.final_state.coordinates]), 2, axis=1)
     states, worst = np.hstack([q @ shapes.T, v @ shapes.T]), 0.0
     for before, after in pairwise(states):
-        _, work, lost, through = bodies.balance(before, machine.cycle_period, size)
+        _, work, lost, through = bodies.balance(before, machine.cycle_period, size, steps)
         change = bodies.energy(after) - bodies.energy(before)
         allowed = (HERTZIAN if hertzian else TOLERANCE) * (through + bodies.energy(after))
         worst = max(worst, abs(change - work + lost) / max(allowed, 1e-300))
+    if worst > 1.0 and steps < FINER:
+        return worst_gap(folder, seed, cycles, hertzian, FINER)
     return worst, int(record.impacts.sum())
 
 
-@pytest.mark.parametrize("seed", range(6))
+@pytest.mark.parametrize("seed", [*range(5), 109])
 def test_energy_comes_from_the_loads_alone(tmp_path, seed):
-    """In every cycle the work of drives and loads is what dampers and stops take and the change of energy."""
+    """In every cycle the work of drives and loads is what dampers and stops take and the change of energy.
+
+    In the last one a stop that has let go is pressed again within rounding.
+    """
     assert worst_gap(tmp_path, seed)[0] < 1.0
 
 
