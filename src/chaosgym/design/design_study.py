@@ -204,8 +204,9 @@ class DesignStudy(Result):
         if nearest is None:
             return "no loss of stability within the tolerances, each varied alone"
         at = quantity_of(with_settings(self.assessment.machine, {nearest.parameter: nearest.value}), nearest.parameter)
-        where = f"{nearest.share:.2f} tolerances {'above' if nearest.side > 0 else 'below'}"
-        return f"nearest loss of stability: {nearest.kind} at {nearest.parameter.replace('_', ' ')} {at}, {where}"
+        side = "above" if nearest.side > 0 else "below"
+        far = f"{nearest.share:.2f} tolerances" if nearest.share >= 0.005 else "less than 0.01 of the tolerance"
+        return f"nearest loss of stability: {nearest.kind} at {nearest.parameter.replace('_', ' ')} {at}, {far} {side}"
 
     def as_dict(self) -> dict[str, Any]:
         """Return plain values for JSON."""
