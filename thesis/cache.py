@@ -1,18 +1,25 @@
-"""The cache of computed results: found again by what was computed and by a digest of the sources that decide it.
+"""The cache of computed results: found again by what was computed, and by the sources and the computer that decide it.
 
-An edit of a kernel, a machine or a test of chaos makes all of them anew. A damaged file is computed again.
+An edit of a kernel, a machine or a test of chaos makes all of them anew, and so does another processor, BLAS or version
+of numpy, scipy or numba. A damaged file is computed again.
 """
 
 import hashlib
 import json
 import os
+import platform
 import zipfile
 from collections.abc import Callable, Mapping
+from functools import cache
+from importlib.metadata import version
 from pathlib import Path
 from typing import Any
 
 import numpy as np
+import scipy.linalg  # noqa: F401 - its BLAS is named too
+from llvmlite import binding
 from numpy.typing import NDArray
+from threadpoolctl import threadpool_info
 
 import chaosgym
 from chaosgym.files import write_atomically
@@ -52,9 +59,18 @@ SOURCES = digest()
 """Digest of the sources at the time of import: those that run."""
 
 
+@cache
+def computer() -> str:
+    """Processor as numba knows it, kernels of BLAS, and versions of what computes."""
+    processor = os.environ.get("NUMBA_CPU_NAME") or binding.get_host_cpu_name()
+    kernels = sorted({str(pool.get("architecture")) for pool in threadpool_info() if pool["user_api"] == "blas"})
+    versions = [f"{name} {version(name)}" for name in ("numpy", "scipy", "numba")]
+    return ", ".join([platform.machine(), processor, *kernels, *versions])
+
+
 def path_of(described: str, folder: Path, suffix: str) -> Path:
-    """File of a result; its description and the sources are in its name as a hash."""
-    return folder / (hashlib.sha256(f"{SOURCES}\n{described}".encode()).hexdigest()[:32] + suffix)
+    """File of a result; its description, the sources and the computer are in its name as a hash."""
+    return folder / (hashlib.sha256(f"{SOURCES}\n{computer()}\n{described}".encode()).hexdigest()[:32] + suffix)
 
 
 def kept_arrays(described: str, folder: Path | None, compute: Callable[[], Arrays]) -> Arrays:

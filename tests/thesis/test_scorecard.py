@@ -291,7 +291,7 @@ def test_one_damping_ratio_holds_for_the_whole_of_section_4_4():
 
 
 def test_results_are_kept_and_found_again(tmp_path, monkeypatch):
-    """The second call runs nothing and gives the same result; another machine or an edited source does."""
+    """The second call runs nothing and gives the same result; another machine, source or computer does."""
     job = Job(observation, PLAIN_BEAM, QUICK["impact-beam"])
     first = run_jobs([job, job], folder=tmp_path)
     assert len(first) == 1
@@ -302,6 +302,10 @@ def test_results_are_kept_and_found_again(tmp_path, monkeypatch):
     monkeypatch.setattr("thesis.cache.SOURCES", "edited")
     assert run_jobs([job], folder=tmp_path)[job]["mean"] == first[job]["mean"]
     assert len(list(tmp_path.glob("*.json"))) == 2
+    monkeypatch.undo()
+    monkeypatch.setattr("thesis.cache.computer", lambda: "another one")
+    assert run_jobs([job], folder=tmp_path)[job]["mean"] == first[job]["mean"]
+    assert len(list(tmp_path.glob("*.json"))) == 3
     kept[0].write_text("{")
     monkeypatch.undo()
     assert run_jobs([job], folder=tmp_path)[job] == first[job]
