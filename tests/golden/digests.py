@@ -15,6 +15,7 @@ from typing import Any
 
 import gymnasium as gym
 import numpy as np
+from numpy._core._multiarray_umath import __cpu_features__
 
 import chaosgym
 from chaosgym.machines import Machine
@@ -22,10 +23,13 @@ from chaosgym.machines.family import KINDS, drawn_machine
 from tests.golden.bits import arrays_of
 from tests.golden.scenes import scenes
 
-NO_AVX512 = {"NPY_DISABLE_CPU_FEATURES": "X86_V4 AVX512_ICL"}
+AVX512 = bool(__cpu_features__.get("X86_V4") or __cpu_features__.get("AVX512_SKX"))
+"""Whether this processor can run as one with AVX-512."""
+
+NO_AVX512 = {"NPY_DISABLE_CPU_FEATURES": "X86_V4 AVX512_ICL"} if AVX512 else {}
 
 PROCESSORS = {
-    "SkylakeX": {},
+    **({"SkylakeX": {}} if AVX512 else {}),
     "Haswell": NO_AVX512,
     "Zen": NO_AVX512,
     "Sandybridge": NO_AVX512,
