@@ -10,14 +10,14 @@ import argparse
 from pathlib import Path
 from typing import Any
 
-import learn_extra  # noqa: F401
+from training import Progress, load_checkpoint, run
+
 import numpy as np
 import torch
 from numpy.typing import NDArray
 from stable_baselines3 import PPO
 from stable_baselines3.common.vec_env import VecEnv, VecEnvWrapper, VecMonitor, VecNormalize
 from torch import nn
-from training import Progress, load_checkpoint, run
 
 from chaosgym.control.policies import save_policy
 from chaosgym.control.policies.export import exported

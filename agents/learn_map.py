@@ -14,13 +14,13 @@ import time
 from pathlib import Path
 from typing import Any, NamedTuple
 
-import learn_extra  # noqa: F401
+from training import CHECKPOINT, keep_arrays, kept_arrays, keywords, run, write_rows
+
 import numpy as np
 import torch
 from numpy.typing import NDArray
 from torch import nn
 from tqdm import tqdm, trange
-from training import CHECKPOINT, keep_arrays, kept_arrays, keywords, run, write_rows
 
 from chaosgym.control.controllers.controller import place_of, seen
 from chaosgym.control.policies import save_policy

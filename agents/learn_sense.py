@@ -14,14 +14,14 @@ import time
 from pathlib import Path
 from typing import Any, NamedTuple
 
-import learn_extra  # noqa: F401
+from training import keep_arrays, kept_arrays, keywords, run, write_rows
+
 import numpy as np
 import torch
 from numpy.typing import NDArray
 from scipy.stats import rankdata
 from torch import nn
 from tqdm import tqdm, trange
-from training import keep_arrays, kept_arrays, keywords, run, write_rows
 
 from chaosgym.control.controllers.controller import seen
 from chaosgym.envs.entries import IrregularProbability

@@ -14,14 +14,14 @@ import time
 from pathlib import Path
 from typing import Any
 
-import learn_extra  # noqa: F401
+from training import keep_arrays, kept_arrays, keywords, run, write_rows
+
 import numpy as np
 import torch
 from learn_map import LOAD_WEIGHT, Array, Jobs, gathered, rows_of, usual
 from torch import nn
 from torch.nn.functional import binary_cross_entropy_with_logits, cross_entropy
 from tqdm import trange
-from training import keep_arrays, kept_arrays, keywords, run, write_rows
 
 from chaosgym.control.comparison import compare
 from chaosgym.control.controllers.controller import Controller, Observations, place_of, seen

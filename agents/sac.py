@@ -9,10 +9,10 @@ The same command goes on with a run that was interrupted, and ends as if it had 
 import argparse
 from pathlib import Path
 
-import learn_extra  # noqa: F401
+from training import Progress, load_checkpoint, run
+
 from stable_baselines3 import SAC
 from stable_baselines3.common.vec_env import VecMonitor, VecNormalize
-from training import Progress, load_checkpoint, run
 
 from chaosgym.control.policies import save_policy
 from chaosgym.control.policies.export import exported

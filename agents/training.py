@@ -19,17 +19,24 @@ import secrets
 import sys
 import time
 from collections.abc import Callable, Iterator
+from importlib.metadata import version
 from pathlib import Path
 from typing import Any
 
 import numpy as np
-import torch
 from numpy.typing import NDArray
-from stable_baselines3.common.callbacks import BaseCallback
 from tqdm import tqdm
 
 from chaosgym.errors import ChaosgymError, ModelFileError
 from chaosgym.files import claimed, contents, held, unpacked, write_atomically
+
+try:
+    import torch
+    from stable_baselines3.common.callbacks import BaseCallback
+
+    version("sb3-contrib")
+except ImportError as missing:
+    sys.exit(f"Error: training needs the extra [learn]: pip install '.[learn]' in a clone of chaosgym ({missing})")
 
 Array = NDArray[Any]
 

@@ -31,8 +31,9 @@ SCRIPTS = ("ppo", "recurrent_ppo", "learn_map", "learn_sense")
 def test_a_script_without_its_packages_names_the_extra(script, package, monkeypatch):
     """It ends with one line, before anything else is loaded."""
     monkeypatch.syspath_prepend(AGENTS)
-    monkeypatch.setitem(sys.modules, package, None)
-    monkeypatch.delitem(sys.modules, "learn_extra", raising=False)
+    for name in [package, *(name for name in sys.modules if name.startswith(f"{package}."))]:
+        monkeypatch.setitem(sys.modules, name, None)
+    monkeypatch.delitem(sys.modules, "training", raising=False)
     with pytest.raises(SystemExit) as ended:
         runpy.run_path(str(AGENTS / f"{script}.py"))
     assert str(ended.value).startswith("Error: training needs the extra [learn]: pip install '.[learn]'")
