@@ -353,7 +353,7 @@ def test_types_that_take_long_are_left_to_the_user(tmp_path, monkeypatch):
     assert quick.timed.seconds < 1.0
     assert len(quick.timed.known) == types_by_default.TIMED + 1
     monkeypatch.setattr(types_by_default, "AFFORDABLE", 0.0)
-    slow = types_by_default.with_affordable_types(plan, tmp_path)
+    slow = types_by_default.with_affordable_types(plan, tmp_path, workers=2)
     assert slow.plan == plan
     assert len(slow.timed.known) == types_by_default.ENOUGH + 1
     SweepFolder(tmp_path, quick.plan, "1")
@@ -366,7 +366,7 @@ def test_the_told_time_of_types_is_that_of_points_all_over_the_plan(monkeypatch)
     plan, clock = replace(PLAN, axes=axes, full_types=1.0), [0.0]
 
     def timed(machine, plan):
-        clock[0] += 10.0 if machine.excitation_frequency > 24.0 and machine.clearance > 0.11e-3 else 0.1
+        clock[0] += 1.0 if machine.excitation_frequency > 24.0 and machine.clearance > 0.11e-3 else 0.01
         return {"full_response_type": "I"}
 
     monkeypatch.setattr(types_by_default, "full_type", timed)
@@ -376,6 +376,20 @@ def test_the_told_time_of_types_is_that_of_points_all_over_the_plan(monkeypatch)
     for row in range(len(plan)):
         timed(plan.machine_at({name: column[0] for name, column in plan.points(range(row, row + 1)).items()}), plan)
     assert clock[0] / 1.5 < told < clock[0] * 1.5
+
+
+def test_types_of_minutes_are_timed_once(monkeypatch):
+    """The first point, which else warms up, tells the time where it takes long; no further one is waited for."""
+    clock = [0.0]
+
+    def slow(machine, plan):
+        clock[0] += 100.0
+        return {"full_response_type": "I"}
+
+    monkeypatch.setattr(types_by_default, "full_type", slow)
+    monkeypatch.setattr(types_by_default, "process_time", lambda: clock[0])
+    timed = types_by_default.timed_types(replace(PLAN, full_types=1.0))
+    assert (len(timed.known), timed.seconds) == (1, 100.0)
 
 
 def test_types_that_were_timed_are_kept(tmp_path, monkeypatch):

@@ -16,7 +16,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from chaosgym.errors import ParameterError
-from chaosgym.simulation.parallel import parallel_map
+from chaosgym.simulation.parallel import number_of_workers, parallel_map
 from chaosgym.sweeps.folder import PLAN_FILE, read_plan_file
 from chaosgym.sweeps.label import full_type
 from chaosgym.sweeps.plan import SweepPlan, spread
@@ -32,6 +32,9 @@ ENOUGH = 4
 
 FAR = 2.0
 """Multiple of what is affordable that is far from it."""
+
+PATIENCE = 20.0
+"""Processor time [s] after which no further point is timed, and above which the first one counts."""
 
 
 class TimedTypes(NamedTuple):
@@ -81,16 +84,20 @@ def with_affordable_types(plan: SweepPlan, folder: str | Path, workers: int | No
 
 
 def timed_types(plan: SweepPlan, workers: int | None = None, affordable: float = math.inf) -> TimedTypes:
-    """Types of a few points of a plan that have one; fewer where one takes far more than an ``affordable`` time [s]."""
+    """Types of a few points of a plan that have one; fewer where they take long, far more than ``affordable`` [s]."""
     typed = np.flatnonzero(plan.with_full_type(range(len(plan))))
     rows = typed[spread(len(typed))[: TIMED + 1]].tolist()
-    known, seconds, counted = _typed(plan, rows[:1], workers), 0.0, 0
-    for part in (rows[1 : ENOUGH + 1], rows[ENOUGH + 1 :]):
-        if counted and seconds > FAR * affordable * counted:
-            break
+    together = number_of_workers(workers)
+    known, seconds, counted = dict[int, dict[str, Any]](), 0.0, 0
+    for part in (rows[:1], *(rows[first : first + together] for first in range(1, len(rows), together))):
         begun = process_time()
         known |= _typed(plan, part, workers)
-        seconds, counted = seconds + process_time() - begun, counted + len(part)
+        took = process_time() - begun
+        if part == rows[:1] and took <= PATIENCE:
+            continue
+        seconds, counted = seconds + took, counted + len(part)
+        if seconds > PATIENCE or (counted >= ENOUGH and seconds > FAR * affordable * counted):
+            break
     return TimedTypes(known, seconds / max(counted, 1))
 
 
