@@ -11,11 +11,12 @@ import time
 from collections.abc import Iterable
 from pathlib import Path
 from typing import Any, NamedTuple
+from unittest.mock import patch
 
-import numba
 import numpy as np
 
 from benchmarks.performance.rates import BEAM, SUB_ENVIRONMENTS
+from chaosgym.core import compilation
 from chaosgym.sweeps import SweepPlan, run_sweep
 from chaosgym.sweeps.plan import default_axes
 
@@ -43,14 +44,13 @@ def powers_of_two(most: int) -> list[int]:
 
 def thread_shares(repeats: int) -> list[Share]:
     """A batch of beams on 1, 2, 4 and up to all threads."""
-    most, which = numba.config.NUMBA_NUM_THREADS, np.arange(SUB_ENVIRONMENTS)
+    which = np.arange(SUB_ENVIRONMENTS)
     batch = BEAM.batch(len(which))
     for i in which.tolist():
         batch.start(i, BEAM.at(8.0 + 22.0 * i / len(which)))
     found, each = [], 1.0 / (CYCLES * len(which))
-    try:
-        for count in powers_of_two(most):
-            numba.set_num_threads(count)
+    for count in powers_of_two(compilation.THREADS):
+        with patch.object(compilation, "THREADS", count):
             batch.run(which, CYCLES)
             runs = []
             for _ in range(repeats):
@@ -59,8 +59,6 @@ def thread_shares(repeats: int) -> list[Share]:
                 runs.append((time.perf_counter() - wall, time.process_time() - processor))
             wall, processor = (statistics.median(column) * each for column in zip(*runs, strict=True))
             found.append(Share("threads", count, wall, processor, ()))
-    finally:
-        numba.set_num_threads(most)
     return found
 
 

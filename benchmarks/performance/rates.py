@@ -13,6 +13,7 @@ from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
+from unittest.mock import patch
 
 import gymnasium as gym
 import numba
@@ -21,6 +22,7 @@ from tqdm import tqdm
 
 from benchmarks.performance.timing import KernelTime, Rate, kernel_time, rate
 from chaosgym.classifier import default_classifier
+from chaosgym.core import compilation
 from chaosgym.machines import MACHINES, ImpactBeam, Machine, SliderCrank
 from chaosgym.simulation import ExactEvents, Integrator, RungeKutta4, simulate
 from chaosgym.sweeps import SweepPlan, run_sweep
@@ -218,9 +220,7 @@ def step_cost(name: str, repeats: int) -> dict[str, float]:
     actions = np.random.default_rng(0).integers(0, 6, steps)
     moved: list[tuple[float, float]] = []
     warm: list[tuple[float, float]] = []
-    threads = numba.get_num_threads()
-    numba.set_num_threads(1)
-    with kernel_time() as kernels:
+    with patch.object(compilation, "THREADS", 1), kernel_time() as kernels:
         for _ in range(repeats):
             moved += _steps_taken(env, actions, kernels)
         kernels.written = []
@@ -229,7 +229,6 @@ def step_cost(name: str, repeats: int) -> dict[str, float]:
         for _ in range(repeats):
             kernels.replayed = iter(kept)
             warm += _steps_taken(env, actions, kernels)
-    numba.set_num_threads(threads)
     whole, python = (statistics.median(column) for column in zip(*moved, strict=True))
     return {"step": whole, "python": python, "warm": statistics.median(python for _, python in warm)}
 

@@ -9,13 +9,14 @@ from collections.abc import Callable
 from dataclasses import replace
 from functools import partial
 from typing import Any, NamedTuple
+from unittest.mock import patch
 
-import numba
 import numpy as np
 
 from benchmarks.performance.rates import BEAM
 from benchmarks.performance.timing import processor_seconds
 from chaosgym import Drive, Structure
+from chaosgym.core import compilation
 from chaosgym.machines.modal_machine.machine_class import Joint, machine_with_joints
 from chaosgym.simulation import simulate
 
@@ -58,12 +59,8 @@ def sizes(repeats: int = 3) -> list[Size]:
     for cycles in CYCLES:
         seconds, kept = _median(partial(simulate, BEAM, cycles), repeats)
         found.append(Size("cycles", cycles, 1e6 * seconds / cycles, 0.0, kept / cycles))
-    threads = numba.get_num_threads()
-    try:
-        numba.set_num_threads(1)  # threads that wait count as well
+    with patch.object(compilation, "THREADS", 1):
         return found + [_of_batch(count, repeats) for count in MACHINES]
-    finally:
-        numba.set_num_threads(threads)
 
 
 def _grid(gaps: int) -> Any:

@@ -10,7 +10,7 @@ from unittest.mock import patch
 import numpy as np
 from numpy.typing import NDArray
 
-from chaosgym.core.compilation import call, call_side_by_side
+from chaosgym.core.compilation import call, call_on_threads
 from chaosgym.machines import batch
 from chaosgym.machines.binned import run
 
@@ -85,10 +85,10 @@ def _writeable(given: Any) -> Iterator[NDArray[Any]]:
 def kernel_time() -> Iterator[KernelTime]:
     """Count the time of these kernels meanwhile."""
     spent = KernelTime()
-    side_by_side = spent.counted(call_side_by_side)
+    on_threads = spent.counted(call_on_threads)
     with ExitStack() as patched:
         for module in (batch, run):
-            patched.enter_context(patch.object(module, "call_side_by_side", side_by_side))
+            patched.enter_context(patch.object(module, "call_on_threads", on_threads))
             if hasattr(module, "call"):
                 patched.enter_context(patch.object(module, "call", spent.counted(call)))
         yield spent

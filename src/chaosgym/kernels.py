@@ -13,10 +13,14 @@ import sys
 import tempfile
 from collections.abc import Callable, Iterator
 from functools import partial
+from itertools import islice
 from pathlib import Path
 from typing import Any
 
 from chaosgym.core.kernel_cache import BASELINE, MADE_FOR, SHIPPED, environment, kernel_digest, source_digest
+
+PROCESSES = 4
+"""Most processes that compile, of half a gigabyte each; more would wait for kernels of each other."""
 
 _JOINTS = """
 [structure]
@@ -116,18 +120,22 @@ def compile_all() -> None:
     target = {"NUMBA_CPU_NAME": BASELINE[platform.machine()], "NUMBA_CPU_FEATURES": ""}
     # numba reads its environment once, so what compiles for another processor is another process
     here = {**os.environ, **target, "NUMBA_CACHE_DIR": str(SHIPPED), "CHAOSGYM_KERNELS": ""}
-    subprocess.run([sys.executable, "-m", "chaosgym.kernels", "here"], env=here, check=True)
+    command = [sys.executable, "-m", "chaosgym.kernels"]
+    count = min(PROCESSES, os.cpu_count() or 1)
+    started = [subprocess.Popen([*command, f"{k}", f"{count}"], env=here) for k in range(count)]
+    if failed := [process for process in started if process.wait()]:
+        raise subprocess.CalledProcessError(failed[0].returncode, failed[0].args)
     for lock in SHIPPED.rglob("*.lock"):
         lock.unlink()
     complete.write_text(content)
 
 
-def _here() -> None:
+def _here(first: int, count: int) -> None:
     with tempfile.TemporaryDirectory() as folder:
-        for name, call in _calls(Path(folder)):
+        for name, call in islice(_calls(Path(folder)), first, None, count):
             print(f"kernels: {name}", flush=True)
             call()
 
 
 if __name__ == "__main__":
-    _here() if sys.argv[1:] == ["here"] else compile_all()
+    _here(*map(int, sys.argv[1:])) if sys.argv[1:] else compile_all()

@@ -114,7 +114,7 @@ def test_processes_that_start_together_compile_once(tmp_path):
 def test_what_is_compiled_already_waits_for_no_one():
     """While another process holds the lock, a kernel that lies on the disk is loaded at once."""
     simulate(ImpactBeam(), 1)
-    with FileLock(compilation._lock_file()):
+    with FileLock(compilation._lock_file(advance_joints)):
         code = "from chaosgym import *; simulate(ImpactBeam(), 1); print('done')"
         process = _in_a_process(code, CHAOSGYM_KERNELS="")
         out, err = process.communicate(timeout=120)

@@ -1,4 +1,4 @@
-"""Many machines with modal impacts at once: each by its own ``advance``, side by side on all threads.
+"""Many machines with modal impacts at once: each by its own ``advance``.
 
 A batch of models is a model whose fields have one more axis, the machines, in front. Tables, which are large, stay
 where they are, and the batch holds their addresses: machines of one structure share them.
@@ -7,11 +7,11 @@ where they are, and the batch holds their addresses: machines of one structure s
 from typing import NamedTuple
 
 import numpy as np
-from numba import carray, prange
+from numba import carray
 
 from chaosgym.core.addresses import pointer
 from chaosgym.core.cycle import CycleArrays
-from chaosgym.core.kernel import njit, side_by_side
+from chaosgym.core.kernel import njit
 from chaosgym.core.modal_impact import advance_model
 from chaosgym.core.modal_model import ModalImpactModel, Regimes, Tables
 from chaosgym.core.tangent import no_tangents
@@ -99,14 +99,14 @@ def beam_of(batch, regimes, tables, i):
     )
 
 
-@side_by_side
-def advance_beams(batch, regimes, tables, which, motions, arrays, settings, outcome):
+@njit(nogil=True)
+def advance_beams(first, end, batch, regimes, tables, which, motions, arrays, settings, outcome):
     """Advance the machines ``which`` (k,) of a batch in place by whole cycles; rows of ``arrays`` in that order.
 
-    Writes the status of each into ``outcome`` (k,). The batch comes without its regimes and tables, and they by
-    themselves: a parallel loop takes no tuples of tuples.
+    Writes the status of each into ``outcome`` (k,). Only the rows from ``first`` to before ``end`` are gone through, so
+    that each thread has its own.
     """
-    for k in prange(which.shape[0]):
+    for k in range(first, end):
         i = which[k]
         outcome[k] = advance_model(
             beam_of(batch, regimes, tables, i),

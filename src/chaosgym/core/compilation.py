@@ -1,8 +1,8 @@
 """Compilation of kernels that the package lacks: once on a computer, however many processes need them.
 
 The first call of a kernel in a process loads its machine code from the disk, or compiles it, which takes seconds, and
-keeps it there. A lock lets one process compile while others that need a kernel not there yet wait and then load it;
-what is there already is loaded without the lock. One line says what takes so long, and a bar how much is left.
+keeps it there. A lock lets one process compile a kernel while others that need it wait and then load it; what is there
+already is loaded without the lock. One line says what takes so long, and a bar how much is left.
 
 What keeps it short: Python calls few kernels, with short chains of calls; arrays are copied in loops, since an
 assignment compiles 60 functions; constants that are handed on are integers of numpy, since numba compiles anew for each
@@ -14,10 +14,11 @@ import logging
 import os
 import shutil
 import tempfile
-import threading
 from collections.abc import Iterator
+from concurrent.futures import ThreadPoolExecutor
 from contextlib import contextmanager
 from functools import cache
+from itertools import pairwise
 from pathlib import Path
 from typing import Any
 
@@ -27,7 +28,6 @@ from numba.core import event
 from numba.core.dispatcher import Dispatcher
 from tqdm import tqdm
 
-from chaosgym.core.kernel import SideBySide
 from chaosgym.core.kernel_cache import KERNEL_CACHE, WANTED_CACHE, why_compile
 from chaosgym.errors import ParameterError
 
@@ -41,18 +41,22 @@ _ready: set[tuple[Any, tuple[int, bool]]] = set()
 
 
 def call(kernel: Any, *arguments: Any) -> Any:
-    """Call a kernel; the first time, compile it or load it while no other process does.
+    """Call a kernel; the first time, load it, or compile it while no other process compiles it.
 
     Raises
     ------
     ParameterError
         If NUMBA_DISABLE_JIT leaves kernels in Python, which has not all their operations.
     """
+    _prepare_once(kernel, *arguments)
+    return kernel(*arguments)
+
+
+def _prepare_once(kernel: Any, *arguments: Any) -> None:
     key = (kernel, (len(arguments), arguments[-1] is None))
     if key not in _ready:
         prepare(kernel, *arguments)
         _ready.add(key)
-    return kernel(*arguments)
 
 
 def call_or_interpret(kernel: Any, *arguments: Any) -> Any:
@@ -60,23 +64,30 @@ def call_or_interpret(kernel: Any, *arguments: Any) -> Any:
     return kernel(*arguments) if numba.config.DISABLE_JIT else call(kernel, *arguments)
 
 
-_one_call_at_a_time = threading.Lock()
-"""Some of numba's threading layers abort the process if two threads call parallel kernels at once."""
+THREADS = numba.config.NUMBA_NUM_THREADS
+"""Threads that move the machines of a batch."""
 
-_forked = threading.Event()
-"""Set in children of a fork: GNU OpenMP ends a child that uses it if its parent did."""
+
+@cache
+def _threads() -> ThreadPoolExecutor:
+    return ThreadPoolExecutor(THREADS, "chaosgym")
+
 
 if hasattr(os, "register_at_fork"):
-    os.register_at_fork(after_in_child=_forked.set)
+    # a child has none of its parent's threads
+    os.register_at_fork(after_in_child=_threads.cache_clear)
 
 
-def call_side_by_side(kernel: SideBySide, machines: int, *arguments: Any) -> None:
-    """Call a kernel over some of a number of machines: on all threads where there are several, and no fork."""
-    if machines == 1 or _forked.is_set():
-        call(kernel.serial, *arguments)
-    else:
-        with _one_call_at_a_time:
-            call(kernel.parallel, *arguments)
+def call_on_threads(kernel: Any, rows: int, *arguments: Any) -> None:
+    """Call a kernel that goes through rows of arrays, from one to before another, on all threads: each has its rows."""
+    threads = max(1, min(rows, THREADS))
+    limits = [rows * k // threads for k in range(threads + 1)]
+    (first, end), *others = pairwise(limits)
+    _prepare_once(kernel, first, end, *arguments)
+    moved = [_threads().submit(kernel, *span, *arguments) for span in others]
+    kernel(first, end, *arguments)
+    for one in moved:
+        one.result()
 
 
 def prepare(kernel: Any, *arguments: Any) -> None:
@@ -89,7 +100,7 @@ def prepare(kernel: Any, *arguments: Any) -> None:
     signature = (*types, *(numba.types.Omitted(default) for default in defaults))
     if _loaded(kernel, signature):
         return
-    with FileLock(_lock_file()):
+    with FileLock(_lock_file(kernel)):
         if _loaded(kernel, signature):
             return
         name, functions, why = name_of(kernel), _functions_of(kernel), _told_once()
@@ -167,9 +178,9 @@ def name_of(kernel: Any) -> str:
     return f"{function.__module__.rpartition('.')[2]}.{function.__qualname__}"
 
 
-def _lock_file() -> str:
+def _lock_file(kernel: Any) -> str:
     os.makedirs(KERNEL_CACHE, exist_ok=True)
-    return os.path.join(KERNEL_CACHE, "compiling.lock")
+    return os.path.join(KERNEL_CACHE, f"{name_of(kernel)}.lock")
 
 
 def _remove_temporary_cache() -> None:

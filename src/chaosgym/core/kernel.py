@@ -1,4 +1,4 @@
-"""Decorators of kernels: those that only compute, pieces of others, and those that move many machines.
+"""Decorators of kernels: those that only compute, and pieces of others.
 
 Kernels take ``njit`` from here, so that their machine code is kept where ``kernel_cache`` says.
 
@@ -8,15 +8,14 @@ works on alive.
 """
 
 from collections.abc import Callable
-from types import FunctionType
-from typing import Any, NamedTuple
+from typing import Any
 
 import numba
 from numba.core.dispatcher import Dispatcher
 
 from chaosgym.core.machine_code import KernelCache
 
-__all__ = ["SideBySide", "leaf", "njit", "part", "side_by_side"]
+__all__ = ["leaf", "njit", "part"]
 
 
 def njit(*, cache: bool = True, **options: Any) -> Callable[[Any], Any]:
@@ -41,21 +40,3 @@ def part(function: Callable[..., Any]) -> Callable[..., Any]:
     """Always inline this kernel into its callers."""
     compiled: Callable[..., Any] = njit(inline="always")(function)
     return compiled
-
-
-class SideBySide(NamedTuple):
-    """A kernel over machines, twice: on all threads, and on one."""
-
-    parallel: Callable[..., Any]
-    serial: Callable[..., Any]
-
-
-def side_by_side(function: Any) -> SideBySide:
-    """Compile a kernel whose ``prange`` goes over machines for all threads, and for one.
-
-    A process that has used GNU OpenMP, as all threads do, can't be forked by one that uses it too.
-    """
-    # numba names its cache of a function by the qualified name
-    alone = FunctionType(function.__code__, function.__globals__, f"{function.__name__}_serially")
-    alone.__qualname__ = alone.__name__
-    return SideBySide(njit(nogil=True, parallel=True)(function), njit(nogil=True)(alone))

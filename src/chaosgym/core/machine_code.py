@@ -15,6 +15,7 @@ from functools import cache
 from pathlib import Path
 from typing import Any
 
+from filelock import FileLock
 from llvmlite.binding import get_host_cpu_features
 from numba.core import caching
 from numba.core.runtime import rtsys
@@ -105,6 +106,12 @@ class KernelCache(caching.FunctionCache):  # type: ignore[misc] # numba has no t
             self._give_up(file, error)
             return {}
         return index
+
+    def save_overload(self, sig: tuple[Any, ...], data: Any) -> None:
+        """Save a kernel while no other process does: numba reads an index of files, adds a name to it and writes it."""
+        os.makedirs(self._cache_path, exist_ok=True)
+        with FileLock(os.path.join(self._cache_path, "saving.lock")):
+            super().save_overload(sig, data)
 
     def load_overload(self, sig: tuple[Any, ...], target_context: Any) -> Any:
         """Load a kernel, without what numba imports to compile: machine code needs counts of references alone."""

@@ -1,12 +1,10 @@
 """Many machines with modal impacts at once, each cycle at a speed of its own, with a small deviation carried along."""
 
-from numba import prange
-
 from chaosgym.core.batch import beam_of
 from chaosgym.core.cycle import CycleArrays
 from chaosgym.core.joints.cycle import advance_joints, room_for
 from chaosgym.core.joints.space import JointRun
-from chaosgym.core.kernel import njit, side_by_side
+from chaosgym.core.kernel import njit
 from chaosgym.core.modal_impact import put_speed, suited_run, suits
 from chaosgym.core.tangent import Tangents
 
@@ -65,12 +63,14 @@ def _vary_beam(batch, regimes, tables, i, speeds, motions, vectors, growth, arra
     return 0
 
 
-@side_by_side
-def advance_varied_beams(batch, regimes, tables, which, speeds, motions, vectors, growth, arrays, settings, outcome):
+@njit(nogil=True)
+def advance_varied_beams(
+    first, end, batch, regimes, tables, which, speeds, motions, vectors, growth, arrays, settings, outcome
+):
     """As ``advance_beams``, for a cycle at each of the excitation frequencies ``speeds`` (k, cycles).
 
     ``vectors`` (N, 1, n_states) are deviations, advanced in place; ``growth`` (k, cycles, 1) receives the logarithm of
     what they grew by. The batch is left at the last speeds.
     """
-    for k in prange(which.shape[0]):
+    for k in range(first, end):
         outcome[k] = _vary_beam(batch, regimes, tables, which[k], speeds, motions, vectors, growth, arrays, settings, k)

@@ -18,7 +18,7 @@ from numpy.typing import NDArray
 from chaosgym.arrays import Array, Indices
 from chaosgym.core import matrices, status
 from chaosgym.core.batch import Motions, Settings, TablesOfMany, advance_beams
-from chaosgym.core.compilation import call_side_by_side
+from chaosgym.core.compilation import call_on_threads
 from chaosgym.core.cycle import CycleArrays
 from chaosgym.core.varied import advance_varied_beams
 from chaosgym.machines.integrators import ExactEvents
@@ -232,13 +232,13 @@ class ModalImpactBatch(VaryingBatch):
 
     def _advance(self, which: Indices, arrays: CycleArrays, outcome: Indices) -> None:
         given = (self._batch, self._regimes, self._tables, which, self._motions, arrays, self._settings, outcome)
-        call_side_by_side(advance_beams, len(self), *given)
+        call_on_threads(advance_beams, len(which), *given)
 
     def _vary(
         self, which: Indices, speeds: Array, vectors: Array, growth: Array, arrays: CycleArrays, outcome: Indices
     ) -> None:
         given = (self._batch, self._regimes, self._tables, which, speeds, self._motions, vectors, growth, arrays)
-        call_side_by_side(advance_varied_beams, len(self), *given, self._settings, outcome)
+        call_on_threads(advance_varied_beams, len(which), *given, self._settings, outcome)
 
 
 def _parts(model: Any) -> tuple[Any, Any, TablesOfMany]:

@@ -14,7 +14,7 @@ import numpy as np
 
 from chaosgym.arrays import Array, Indices
 from chaosgym.core import status
-from chaosgym.core.compilation import call, call_side_by_side
+from chaosgym.core.compilation import call, call_on_threads
 from chaosgym.core.cycle import CycleArrays
 from chaosgym.core.joints.batch import JointModel, advance_joint_machines, displacement_weights
 from chaosgym.core.joints.cycle import advance_joints, room_for
@@ -228,7 +228,7 @@ class JointBatch(VaryingBatch):
                 until = min(until + count, cycles)
             before, began = done.copy(), time.perf_counter()
             moved = (self._motions, vectors, growth, arrays, self._settings, until, done, outcome, needed)
-            call_side_by_side(advance_joint_machines, len(self), self._batch, which, ahead, speeds, *moved)
+            call_on_threads(advance_joint_machines, ahead.size, self._batch, which, ahead, speeds, *moved)
             count = max(1, int(count * min(MAX_GROWTH, CALL_SECONDS / max(time.perf_counter() - began, 1e-9))))
             for k in ahead[outcome[ahead] == status.NEEDS_SET].tolist():
                 made[k] = 1 if done[k] > before[k] else made[k] + 1

@@ -1,11 +1,11 @@
-"""Many mechanisms at once: each by its own ``advance``, side by side on all threads.
+"""Many mechanisms at once: each by its own ``advance``.
 
 The large table of a mechanism stays where it is, and its batch holds the address: machines at equal speeds share
 it.
 """
 
 import numpy as np
-from numba import carray, prange
+from numba import carray
 
 from chaosgym.core.addresses import pointer
 from chaosgym.core.batch import rows_of
@@ -13,7 +13,7 @@ from chaosgym.core.binned.cycle import advance as advance_binned
 from chaosgym.core.binned.model import BinnedModel, TaylorModel
 from chaosgym.core.binned.tables import table_places
 from chaosgym.core.binned.taylor import advance as advance_taylor
-from chaosgym.core.kernel import njit, side_by_side
+from chaosgym.core.kernel import njit
 from chaosgym.core.tangent import no_tangents
 from chaosgym.core.varied import cycle_of
 
@@ -45,10 +45,10 @@ def binned_model_of(batch, i):
     )
 
 
-@side_by_side
-def advance_binned_machines(batch, which, motions, arrays, settings, outcome):
+@njit(nogil=True)
+def advance_binned_machines(first, end, batch, which, motions, arrays, settings, outcome):
     """As ``advance_beams``, for mechanisms."""
-    for k in prange(which.shape[0]):
+    for k in range(first, end):
         i = which[k]
         outcome[k] = advance_binned(
             binned_model_of(batch, i),
@@ -84,13 +84,13 @@ def _kick_crank(model, kicks, coordinates, scale, bouncing, arrays, settings, k)
     return 0
 
 
-@side_by_side
-def advance_kicked_machines(batch, which, kicks, motions, scale, arrays, settings, outcome):
+@njit(nogil=True)
+def advance_kicked_machines(first, end, batch, which, kicks, motions, scale, arrays, settings, outcome):
     """As ``advance_binned_machines``; before each cycle velocities change by ``kicks`` (k, cycles, n_states / 2).
 
     These are shares of the largest velocities so far, which ``scale`` (N, n_states) keeps.
     """
-    for k in prange(which.shape[0]):
+    for k in range(first, end):
         i = which[k]
         model = binned_model_of(batch, i)
         outcome[k] = _kick_crank(
@@ -122,10 +122,10 @@ def taylor_model_of(batch, i):
     )
 
 
-@side_by_side
-def advance_taylor_machines(batch, which, motions, arrays, settings, outcome):
+@njit(nogil=True)
+def advance_taylor_machines(first, end, batch, which, motions, arrays, settings, outcome):
     """As ``advance_beams``, for mechanisms that move by Taylor series."""
-    for k in prange(which.shape[0]):
+    for k in range(first, end):
         i = which[k]
         outcome[k] = advance_taylor(
             taylor_model_of(batch, i),

@@ -1,4 +1,4 @@
-"""Many machines with several joints at once, each cycle at a speed of its own: by ``advance_joints``, on all threads.
+"""Many machines with several joints at once, each cycle at a speed of its own: by ``advance_joints``.
 
 Tables, work space and numbers of the sets stay where they are, and a batch holds their addresses.
 """
@@ -6,13 +6,13 @@ Tables, work space and numbers of the sets stay where they are, and a batch hold
 from typing import NamedTuple
 
 import numpy as np
-from numba import carray, prange
+from numba import carray
 
 from chaosgym.core.addresses import pointer
 from chaosgym.core.joints.cycle import advance_joints, room_for
 from chaosgym.core.joints.sets import put_sets, set_length
 from chaosgym.core.joints.space import OWN, JointRun
-from chaosgym.core.kernel import njit, side_by_side
+from chaosgym.core.kernel import njit
 from chaosgym.core.tangent import Tangents
 from chaosgym.core.varied import cycle_of
 
@@ -95,9 +95,9 @@ def _advance(batch, i, speeds, motions, vectors, growth, arrays, settings, until
     return 0, code
 
 
-@side_by_side
+@njit(nogil=True)
 def advance_joint_machines(
-    batch, which, ahead, speeds, motions, vectors, growth, arrays, settings, until, done, outcome, needed
+    first, end, batch, which, ahead, speeds, motions, vectors, growth, arrays, settings, until, done, outcome, needed
 ):
     """Go on with those machines of ``which`` (k,) whose places are ``ahead``, to cycle ``until``, unless they fail.
 
@@ -105,7 +105,7 @@ def advance_joint_machines(
     ``advance_varied_beams``, or none, (N, 0, 2n + f) and (k, cycles, 0). ``done``, ``outcome`` and ``needed`` (k,) are
     the cycles that each has finished, its status, and with NEEDS_SET the number of the set.
     """
-    for place in prange(ahead.shape[0]):
+    for place in range(first, end):
         k = ahead[place]
         outcome[k], needed[k] = _advance(
             batch, which[k], speeds, motions, vectors, growth, arrays, settings, until, k, done

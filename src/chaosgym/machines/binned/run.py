@@ -11,7 +11,7 @@ from chaosgym.core.binned.cycle import advance
 from chaosgym.core.binned.fixed_step import advance_binned_fixed_step
 from chaosgym.core.binned.model import BinnedModel, TaylorModel
 from chaosgym.core.binned.taylor import advance as advance_stepped
-from chaosgym.core.compilation import call, call_side_by_side
+from chaosgym.core.compilation import call, call_on_threads
 from chaosgym.core.cycle import CycleArrays
 from chaosgym.core.tangent import Tangents, no_tangents
 from chaosgym.machines.batch import CompiledBatch, Cycles, KickedBatch, put, stacked
@@ -128,12 +128,12 @@ class BinnedBatch(KickedBatch):
         """``kick`` the machines ``which`` (k,) by each of the shares (k, cycles, n_velocities) and run them a cycle."""
         arrays, outcome = self._empty(*kicks.shape[:2])
         given = (self._batch, which, kicks, self._motions, self._scale, arrays, self._settings, outcome)
-        call_side_by_side(advance_kicked_machines, len(self), *given)
+        call_on_threads(advance_kicked_machines, len(which), *given)
         return self._cycles(arrays, outcome)
 
     def _advance(self, which: Indices, arrays: CycleArrays, outcome: Indices) -> None:
         given = (self._batch, which, self._motions, arrays, self._settings, outcome)
-        call_side_by_side(advance_binned_machines, len(self), *given)
+        call_on_threads(advance_binned_machines, len(which), *given)
 
 
 class TaylorBatch(CompiledBatch):
@@ -162,4 +162,4 @@ class TaylorBatch(CompiledBatch):
 
     def _advance(self, which: Indices, arrays: CycleArrays, outcome: Indices) -> None:
         given = (self._batch, which, self._motions, arrays, self._settings, outcome)
-        call_side_by_side(advance_taylor_machines, len(self), *given)
+        call_on_threads(advance_taylor_machines, len(which), *given)
