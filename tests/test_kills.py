@@ -25,13 +25,13 @@ ROOT = Path(__file__).parent.parent
 MOMENTS = int(os.environ.get("CHAOSGYM_KILLS", "1"))
 """Kills of each command; each takes a start and half of the work after it."""
 
-SWEEP = "impact-beam --axis excitation_frequency=10:30 --axis clearance=5e-5:2e-4 --sampling sobol:1200:2 --budget 100"
+SWEEP = "impact-beam --axis excitation_frequency=10:30 --axis clearance=5e-5:2e-4 --sampling sobol:400:2 --budget 100"
 BEAM = "chaosgym/ImpactBeamTolerance-v1"
-TRAIN = f"--env {BEAM} --steps 7680 --envs 32 --rollout 60 --batch 240 --every 1920"
+TRAIN = f"--env {BEAM} --steps 5760 --envs 32 --rollout 60 --batch 240 --every 1920"
 COMPARE = ("compare", BEAM, "--machines", "8", "--only", "follow the demand", "--only", "back off")
 CROSSES = (
     "impact-beam --axis damping_ratio=0.01:0.05:log --axis excitation_frequency=18:30 "
-    "--axis clearance=1e-4:1.4e-4:log --sampling crosses:60:3 --budget 100 --label signals=1"
+    "--axis clearance=1e-4:1.4e-4:log --sampling crosses:30:3 --budget 100 --label signals=1"
 )
 
 
@@ -39,7 +39,7 @@ SMALL = "--envs 16 --rollout 60 --batch 240 --every 960"
 SCRIPTS = {
     "ppo": TRAIN,
     "recurrent_ppo": f"--env {BEAM} --steps 960 --envs 4 --rollout 30 --batch 60 --every 120 --epochs 3 --units 16",
-    "constrained_ppo": f"--env {BEAM} --steps 3840 {SMALL}",
+    "constrained_ppo": f"--env {BEAM} --steps 2880 {SMALL}",
     "sac": f"--env {BEAM} --steps 1600 --envs 8 --every 400 --gradient-steps 1",
     "learn_map": f"--env {BEAM} --steps 1920 --envs 4 --epochs 3 --units 16",
 }

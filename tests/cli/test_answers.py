@@ -80,7 +80,7 @@ QUICK = {
 
 LONG = {
     "fit": f"impact-beam --frequency-hz 30 {PEAKS} --estimate clearance",
-    "branch": 'impact-beam --along "speed=17:18.2 Hz:5" --workers 1 --out o.csv;'
+    "branch": 'impact-beam --fidelity standard --along "speed=17.3:17.7 Hz:3" --workers 1 --out o.csv;'
     'impact-beam --fidelity standard --along "speed=17.3:17.7 Hz:3" --against "clearance=0.12mm:0.134mm:3" --workers 1',
     "tradeoff": "impact-beam --points 1 --cycles 20 --transient 20 --budget 0.05 --workers 1",
     "compare": f'{BEAM} --machines 2 --only "follow the demand" --out scores.parquet',

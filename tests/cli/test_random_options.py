@@ -35,13 +35,13 @@ CALLS = {
 
 SLOW_CALLS = {
     "fit": (f"impact-beam {DOCS}/data/peaks.csv --column upper --sensor-error '1 N' --estimate clearance",),
-    "branch": ("impact-beam --along 'speed=17:18.2 Hz:3' --workers 1",),
+    "branch": ("impact-beam --fidelity standard --along 'speed=17.3:17.7 Hz:3' --workers 1",),
     "run-agent": (f"{BEAM} --machine 13",),
     "compare": (f"{BEAM} --machines 2 --only 'follow the demand'",),
 }
 """Commands that take seconds; one line of each is drawn in the slow tests."""
 
-LINES = int(os.environ.get("CHAOSGYM_LINES", "60"))
+LINES = int(os.environ.get("CHAOSGYM_LINES", "24"))
 """Lines of each command in the slow test."""
 
 LEFT_OUT = {

@@ -98,7 +98,7 @@ def test_a_diagnosis_anywhere_in_the_box_of_the_beam(fields):
 
 
 @pytest.mark.slow
-@settings(max_examples=200, deadline=None, suppress_health_check=list(HealthCheck))
+@settings(max_examples=40, deadline=None, suppress_health_check=list(HealthCheck))
 @given(fields=box(ImpactBeam))
 def test_many_diagnoses_anywhere_in_the_box_of_the_beam(fields):
     """The same, many times."""

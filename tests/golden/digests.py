@@ -31,12 +31,9 @@ NO_AVX512 = {"NPY_DISABLE_CPU_FEATURES": "X86_V4 AVX512_ICL"} if AVX512 else {}
 PROCESSORS = {
     **({"SkylakeX": {}} if AVX512 else {}),
     "Haswell": NO_AVX512,
-    "Zen": NO_AVX512,
-    "Sandybridge": NO_AVX512,
-    "Nehalem": NO_AVX512,
     "Prescott": NO_AVX512,
 }
-"""Environment of each set of kernels of OpenBLAS. All have fused multiply-add, as processors since 2013 do."""
+"""Environment of sets of kernels of OpenBLAS: the newest, that of most processors, the oldest. All have fused multiply-add, as processors since 2013 do."""
 
 FEW = ("impact-beam: periodic", "impact-beam: chaotic", "slider-crank: both joints", "four-bar-akhadkar", "gear")
 """What is compared where not all is."""

@@ -17,10 +17,7 @@ def test_a_motion_has_the_same_bits_on_an_old_and_a_new_processor():
 
 @pytest.mark.slow
 def test_all_machines_have_the_same_bits_on_every_processor():
-    """Every scene, published machine, drawn machine and task, to the last bit, impacts and chaos included.
-
-    There are six; five where this one has no AVX-512.
-    """
+    """Every scene, published machine, drawn machine and task, to the last bit, impacts and chaos included."""
     first, *others = (on(processor, "all") for processor in PROCESSORS)
     assert len(first) > 200
     assert [_differing(first, other) for other in others] == [[]] * (len(PROCESSORS) - 1)
