@@ -145,11 +145,11 @@ def test_a_million_cycles_drift_neither_in_phase_nor_in_energy():
 
 
 @pytest.mark.slow
-def test_a_million_revolutions_of_the_crank_do_not_drift():
-    """A period-1 response of impacts is where it was, after a thousand revolutions and after a million in one run."""
+def test_many_revolutions_of_the_crank_do_not_drift():
+    """A period-1 response of impacts is where it was, after a thousand revolutions and after 200,000 in one run."""
     crank = SliderCrank(rod="rigid", matrix_update_interval=30.0, crank_speed=600.0, contact_damping_ratio=1.0)
     early = simulate(crank, 1, transient=1000)
-    late = simulate(crank, 1, transient=10**6)
+    late = simulate(crank, 1, transient=200_000)
     assert early.impacts.sum() >= 2
     np.testing.assert_allclose(late.section, early.section, rtol=1e-6, atol=1e-12)
     np.testing.assert_allclose(late.peak_force, early.peak_force, rtol=1e-7)
@@ -265,7 +265,7 @@ def test_anywhere_in_the_admissible_box_of_the_beam(fields):
 
 
 @pytest.mark.slow
-@settings(max_examples=40, deadline=None)
+@settings(max_examples=15, deadline=None)
 @given(fields=box(SliderCrank))
 def test_anywhere_in_the_admissible_box_of_the_crank(fields):
     """Whatever is admissible ends in an answer within its bound, or in an error of this package."""

@@ -139,6 +139,6 @@ def test_a_dozen_lines_of_random_options(name, tmp_path, monkeypatch):
 def test_many_lines_of_random_options(name, tmp_path, monkeypatch):
     """As the test above."""
     monkeypatch.chdir(tmp_path)
-    for number in range(LINES if name in CALLS else max(1, LINES // 60)):
+    for number in range(LINES if name in CALLS else max(1, LINES // 24)):
         answers(name, random.Random(f"more of {name} {number}"))
     assert list(tmp_path.iterdir()) == []
