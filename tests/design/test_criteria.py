@@ -45,7 +45,7 @@ def machine_of(kind, folder):
     [
         "impact-beam",
         "own",
-        *(pytest.param(one, marks=pytest.mark.slow) for one in ("slider-crank", "compressor", "four-bar")),
+        *(pytest.param(one, marks=pytest.mark.slow) for one in ("slider-crank", "compressor")),
     ],
 )
 def test_a_template_of_each_kind_is_told_and_not_judged(kind, tmp_path):

@@ -13,7 +13,7 @@ from tests.machines.bodies import Bodies, Surface
 TOLERANCE = 1e-8
 """Largest gap in a cycle's balance, as a share of what went through and of the energy stored."""
 
-MACHINES = int(os.environ.get("CHAOSGYM_ENERGY", "60"))
+MACHINES = int(os.environ.get("CHAOSGYM_ENERGY", "30"))
 """Random files of the slow test; ``CHAOSGYM_ENERGY=300`` asks for more."""
 
 HERTZIAN = 1e-7
