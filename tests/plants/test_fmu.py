@@ -188,15 +188,15 @@ def test_our_own_fmu_gives_the_peaks_of_simulate(plants, tmp_path):
     path = export_fmu(machine, tmp_path / "beam.fmu", samples=4096)
     plant = plants(path, output=["peak_force_upper", "peak_force_lower"], samples=1)
     plant.reset()
-    record = chaosgym.simulate(machine, 30)
-    told = np.abs(plant.run(20.0, 30)["peaks"])
+    record = chaosgym.simulate(machine, 15)
+    told = np.abs(plant.run(20.0, 15)["peaks"])
     np.testing.assert_array_equal(told, record.peak_force)
     plant = plants(path, samples=4096)
     plant.reset()
-    told = plant.run(20.0, 30)
+    told = plant.run(20.0, 15)
     np.testing.assert_allclose(np.abs(told["peaks"]), record.peak_force, rtol=1e-2)
-    assert told["impacts"] == pytest.approx(record.impacts.sum() / 30, rel=0.05)
-    assert told["bouncing"] == pytest.approx(record.bounce_duration.sum() * 20.0 / 30, rel=0.05)
+    assert told["impacts"] == pytest.approx(record.impacts.sum() / 15, rel=0.05)
+    assert told["bouncing"] == pytest.approx(record.bounce_duration.sum() * 20.0 / 15, rel=0.05)
 
 
 def test_a_unit_of_our_own_fmu_is_heeded(plants, tmp_path):
