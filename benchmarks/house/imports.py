@@ -42,11 +42,13 @@ def imports(package: Package) -> set[Import]:
 def _statements(node: ast.AST, kind: Kind) -> Iterator[tuple[ast.Import | ast.ImportFrom, Kind]]:
     """Statements of import below a node, and when they run."""
     for child in ast.iter_child_nodes(node):
+        if isinstance(child, ast.expr):  # holds no statement
+            continue
         if isinstance(child, ast.Import | ast.ImportFrom):
             yield child, kind
         elif isinstance(child, ast.If) and "TYPE_CHECKING" in ast.unparse(child.test):
             yield from _statements(child, Kind.TYPES)
-        elif isinstance(child, (*FUNCTIONS, ast.Lambda)) and kind is Kind.LOAD:
+        elif isinstance(child, FUNCTIONS) and kind is Kind.LOAD:
             yield from _statements(child, Kind.FUNCTION)
         else:
             yield from _statements(child, kind)

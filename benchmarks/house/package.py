@@ -2,7 +2,7 @@
 
 import ast
 from collections import Counter
-from collections.abc import Iterable
+from collections.abc import Iterable, Iterator
 from functools import cached_property
 from pathlib import Path
 from typing import NamedTuple
@@ -74,7 +74,7 @@ class Package:
         """Arguments of every function, by ``module:function``, those with most first; ``self`` and ``cls`` are none."""
         counts: dict[str, int] = {}
         for module in self.modules.values():
-            for node in ast.walk(module.tree):
+            for node in statements(module.tree):
                 if isinstance(node, FUNCTIONS):
                     names = [each.arg for each in (*node.args.posonlyargs, *node.args.args)]
                     count = len(names) - (names[:1] in (["self"], ["cls"])) + len(node.args.kwonlyargs)
@@ -83,12 +83,20 @@ class Package:
         return dict(sorted(counts.items(), key=lambda row: (-row[1], row[0])))
 
 
+def statements(node: ast.AST) -> Iterator[ast.AST]:
+    """All nodes below one but expressions, which hold no statement."""
+    for child in ast.iter_child_nodes(node):
+        if not isinstance(child, ast.expr):
+            yield child
+            yield from statements(child)
+
+
 def code_lines(text: str, tree: ast.Module) -> int:
     """Lines of a source that are neither blank nor a comment nor a text that is no value, such as a docstring."""
     code = {
         number for number, line in enumerate(text.splitlines(), 1) if line.strip() and not line.strip().startswith("#")
     }
-    for node in ast.walk(tree):
+    for node in statements(tree):
         if isinstance(node, ast.Expr) and isinstance(node.value, ast.Constant) and isinstance(node.value.value, str):
             code -= {*range(node.lineno, (node.end_lineno or node.lineno) + 1)}
     return len(code)

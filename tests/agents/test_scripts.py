@@ -77,13 +77,28 @@ def test_a_map_is_learned_from_jobs_that_are_not_run_again(tmp_path):
         assert job.deviation.max() < 3.0
 
 
-def test_a_sense_is_learned_from_rounds_that_are_not_run_again(tmp_path):
+def test_a_sense_is_learned_from_rounds_that_are_not_run_again(tmp_path, monkeypatch):
     """A run that goes on has the bytes of one that never stopped, and its sense tells probabilities."""
-    small = ("--envs", "4", "--epochs", "2", "--units", "16", "--keywords", '{"level": "fleet", "split": "train"}')
-    _train("learn_sense", tmp_path / "whole", 960, *small)
-    _train("learn_sense", tmp_path / "parts", 480, *small)
+    monkeypatch.syspath_prepend(str(AGENTS))
+    import learn_sense
+
+    small = ["--envs", "2", "--epochs", "2", "--units", "16", "--batch", "64"]
+    fleet = ["--keywords", '{"level": "fleet", "split": "train"}']
+    rounds, play_one = [], learn_sense.play
+    monkeypatch.setattr(learn_sense, "play", lambda asked, k: rounds.append(k) or play_one(asked, k))
+
+    def train(name, steps):
+        """What the script does with these arguments."""
+        monkeypatch.setattr(
+            sys, "argv", ["learn_sense", "--steps", steps, "--out", str(tmp_path / name), *small, *fleet]
+        )
+        learn_sense.run(learn_sense.train, learn_sense.arguments())
+
+    train("whole", "480")
+    train("parts", "240")
     first = (tmp_path / "parts" / "sense.npz").read_bytes()
-    _train("learn_sense", tmp_path / "parts", 960, *small)
+    train("parts", "480")
+    assert rounds == [0, 1, 0, 1], "two of the whole, one of each part"
     assert first != (tmp_path / "parts" / "sense.npz").read_bytes() == (tmp_path / "whole" / "sense.npz").read_bytes()
     rows = list(csv.DictReader((tmp_path / "whole" / "progress.csv").read_text().splitlines()))
     assert [row["epoch"] for row in rows] == ["1", "2"]

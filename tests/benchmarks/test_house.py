@@ -7,7 +7,7 @@ from collections.abc import Iterator
 from dataclasses import InitVar
 from importlib import import_module
 from pathlib import Path
-from typing import ClassVar, final
+from typing import Any, ClassVar, final
 
 import click
 import pytest
@@ -184,11 +184,16 @@ def test_options_of_machines_stand_apart() -> None:
     }
 
 
-def test_the_library_has_no_circle_and_no_class_name_twice() -> None:
+@pytest.fixture(scope="module")
+def library() -> dict[str, Any]:
+    """What the library's own sources tell."""
+    return of_sources(Package(Path(chaosgym.__file__).parent))
+
+
+def test_the_library_has_no_circle_and_no_class_name_twice(library: dict[str, Any]) -> None:
     """No module reaches itself by imports, those for types and those within functions among them."""
-    found = of_sources(Package(Path(chaosgym.__file__).parent))
-    assert {kind: circle["modules"] for kind, circle in found["circles"].items()} == {kind: [] for kind in CIRCLES}
-    assert found["classes_named_twice"]["modules"] == {}
+    assert {kind: circle["modules"] for kind, circle in library["circles"].items()} == {kind: [] for kind in CIRCLES}
+    assert library["classes_named_twice"]["modules"] == {}
 
 
 def test_a_clearance_reaches_a_kernel() -> None:
@@ -199,8 +204,9 @@ def test_a_clearance_reaches_a_kernel() -> None:
     assert found["modules"] < found["modules_loaded"]
 
 
-def test_figures_of_another_commit_stand_beside(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_figures_of_another_commit_stand_beside(library: dict[str, Any], monkeypatch: pytest.MonkeyPatch) -> None:
     """The stored measurement names the same figures as the command does, so that each stands beside its former self."""
+    monkeypatch.setattr("benchmarks.house.of_sources", lambda _: library)
     monkeypatch.setattr("benchmarks.house.judging", lambda _: {"modules_loaded": 1, "processor_seconds": 1.0})
     monkeypatch.setattr("benchmarks.house.journey", lambda _: {"calls": 1})
     answer = CliRunner().invoke(app, ["house", "--json", "--beside", "docs/data/house.json"])

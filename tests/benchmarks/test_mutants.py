@@ -42,9 +42,9 @@ def test_the_sample_covers_every_wing_but_kernels():
 
 def test_a_change_is_one_place_of_a_module_and_the_same_each_time():
     """It compiles, differs from what is there, and a seed draws it again."""
-    first, again = (list(islice(sample(600, 0), 4)) for _ in range(2))
+    first, again = (list(islice(sample(600, 0), 2)) for _ in range(2))
     assert first == again
-    assert first != list(islice(sample(600, 1), 4))
+    assert first[:1] != list(islice(sample(600, 1), 1))
     assert next(sample(600, 0, (first[0].wing,))) == first[0], "a wing is drawn by itself"
     for change in first:
         assert isinstance(change, Change)

@@ -101,6 +101,7 @@ def test_what_grows_is_measured_and_drawn(monkeypatch: pytest.MonkeyPatch, tmp_p
     """Every size has a cost and a memory, and of two gaps there are more tables than of one."""
     for name, fewer in (("MODES", (2,)), ("STIFFNESS", (1e6,)), ("GAPS", (1, 2)), ("CYCLES", (9,)), ("MACHINES", (2,))):
         monkeypatch.setattr(sizes, name, fewer)
+    monkeypatch.setattr(sizes, "TIMED", 30)
     picture = tmp_path / "scaling.png"
     run = CliRunner().invoke(app, ["bench", "--scaling", "--repeats", "1", "--json", "--figure", str(picture)])
     assert run.exit_code == 0, run.output
@@ -215,8 +216,9 @@ def test_other_programs_move_the_same_beam() -> None:
     assert all(math.isnan(each.error) for name, each in found.items() if "not installed" in name)
 
 
-def test_what_people_wait_for_is_measured() -> None:
+def test_what_people_wait_for_is_measured(monkeypatch: pytest.MonkeyPatch) -> None:
     """A type takes no less than a nature; a batch keeps more than the states of its machines, and shares tables."""
+    monkeypatch.setattr("benchmarks.performance.waits.POINTS", 3)
     found = waits(1)
     assert all(value > 0.0 for value in found.values())
     assert found["classify a random beam, types"] > 0.5 * found["classify a random beam, nature"]

@@ -73,6 +73,8 @@ def test_rows_are_kept(tmp_path, monkeypatch):
     monkeypatch.setattr(
         "benchmarks.envs.sense.held", lambda machines, speeds, seed, split="train": made_up(machines, seed)
     )
+    monkeypatch.setattr("benchmarks.envs.sense.LOOKS", (10, 60))
+    monkeypatch.setattr("benchmarks.envs.sense.DRAWS", 20)
     kept, senses = tmp_path / "sense.json", ("felt", "felt, all", "observation", "sequence", "shipped")
     found = sense(40, 40, 4, senses, kept)
     assert len(found) == 10

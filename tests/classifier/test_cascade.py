@@ -93,7 +93,7 @@ def test_types_are_those_of_the_diagnosis(beam):
     Probabilities of types stand wherever the natures of all five points are told.
     """
     agreed = 0
-    machines = random_beams(24, 7)
+    machines = random_beams(12, 7)
     for machine in machines:
         answer = beam.classify(machine)
         points = [diagnose(one) for one in (machine, *neighbours_of(machine))]
@@ -101,7 +101,7 @@ def test_types_are_those_of_the_diagnosis(beam):
         agreed += answer.response_type == type_of_cross([verdict.nature for verdict in points], peaks)[0]
         told = all(point.nature for point in (answer.centre, *answer.neighbours))
         assert sum(answer.type_probabilities.values()) == pytest.approx(1.0 if told else 0.0)
-    assert agreed >= 22
+    assert agreed >= 11
 
 
 def test_a_calm_neighbourhood_is_proven_to_be_type_i(beam):

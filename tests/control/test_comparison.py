@@ -78,10 +78,11 @@ def test_a_comparison_goes_on(table, monkeypatch):
 
 def test_more_machines_are_added(table, tmp_path):
     """A comparison on two machines that goes on to four holds the jobs of one that had four from the start."""
-    out, names = tmp_path / "beam.parquet", [ZERO, ONE, "back off"]
+    out, names = tmp_path / "beam.parquet", [ZERO, "back off"]
     compare(BEAM, out, machines=2, only=names)
     order = [("contender", "ascending"), ("machine", "ascending")]
-    assert compare(BEAM, out, machines=4, only=names).sort_by(order).equals(table[0].sort_by(order))
+    from_the_start = table[0].filter(pa.compute.not_equal(table[0]["contender"], ONE))
+    assert compare(BEAM, out, machines=4, only=names).sort_by(order).equals(from_the_start.sort_by(order))
 
 
 def test_there_are_no_more_machines_than_are_kept(tmp_path):
@@ -139,7 +140,8 @@ def test_evaluation_takes_whatever_acts():
     follows = TrainedPolicy(BEAM, "trim", Network(None, (layer,)))
     # a keyword, so that the scale is computed with the kernels at hand
     policies = (lambda _: 5, Follow(), follows)
-    scores = [chaosgym.evaluate(policy, BEAM, machines=2, steps=30).score for policy in policies]
+    short = {"steps": 30, "lowest_speed": 20.0, "highest_speed": 24.0, "lowest_demand": 21.0, "highest_demand": 23.0}
+    scores = [chaosgym.evaluate(policy, BEAM, machines=2, **short).score for policy in policies]
     assert scores == [0.0, 0.0, 0.0]
 
 

@@ -50,7 +50,7 @@ def test_machines_of_training_are_trusted():
 def test_foreign_machines_are_followed(changed):
     """With structural damping doubled or halved all are found foreign within ten steps; the demand is followed."""
     guard = GuardedPolicy(shipped_policy(ENV), fleet=False)
-    guarded, follow = (play(one, ENV, seeds=SEEDS, **changed) for one in (guard, Follow()))
+    guarded, follow = (play(one, ENV, seeds=SEEDS[:4], **changed) for one in (guard, Follow()))
     assert not guard.trusted.any()
     assert guard.followed.all()
     assert guard.statement() == "this machine is foreign to the policy, so its guard followed the demand"
@@ -84,7 +84,7 @@ def test_a_map_leaves_the_demand_for_a_gain_alone():
 def test_a_policy_with_a_memory_is_guarded():
     """The PPO of the crank knows what is usual by its memory, and nine in ten of its machines are trusted."""
     guard = GuardedPolicy(shipped_policy(CRANK))
-    play(guard, CRANK, seeds=range(24_000_000, 24_000_032), steps=20)
+    play(guard, CRANK, seeds=range(24_000_000, 24_000_012), steps=20)
     assert guard.trusted.mean() > 0.9
 
 
@@ -187,7 +187,7 @@ def test_a_policy_without_a_memory_is_refused():
 
 def test_an_evaluation_guards_if_asked():
     """It plays what the guard plays, which follows until the speed has settled, and not what the policy plays."""
-    short = {"steps": 30}
+    short = {"steps": 20}
     alone, behind = (
         chaosgym.evaluate(shipped_policy(ENV), ENV, machines=2, guard=one, **short) for one in (False, True)
     )

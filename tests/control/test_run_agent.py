@@ -23,8 +23,15 @@ def test_a_job_among_many_is_the_job_alone():
         np.testing.assert_array_equal(values, vars(alone)[name], err_msg=name)
 
 
+@pytest.fixture
+def few_pictures(monkeypatch):
+    """Animations of five pictures."""
+    monkeypatch.setattr("chaosgym.plotting.played_job.FRAMES", 5)
+
+
+@pytest.mark.usefixtures("few_pictures")
 def test_a_job_is_played_and_animated(folder, tmp_path):
-    """The trim falls to its end and stays, following goes where it is asked; the animation has 50 pictures."""
+    """The trim falls to its end and stays, following goes where it is asked; the animation has all its pictures."""
     out = tmp_path / "job.gif"
     told = run_json("run-agent", ENV, "--policy", str(folder), "--machine", "4", "--out", str(out))
     assert told["status"] == told["follow"]["status"] == "job_done"
@@ -34,7 +41,7 @@ def test_a_job_is_played_and_animated(folder, tmp_path):
     assert told["follow"]["mean_deviation"] < 0.1
     assert len(told["type_iii"]) == len(told["mean_peak_force_N"]) == 120
     with Image.open(out) as animation:
-        assert animation.n_frames == 50
+        assert animation.n_frames == 5
     again = run_json("run-agent", ENV, "--policy", str(folder), "--machine", "4")
     assert told.pop("plot") == str(out)
     assert told == again
@@ -51,6 +58,7 @@ def test_a_figure_is_drawn_beside_a_table(folder, tmp_path):
 
 
 @pytest.mark.skipif(shutil.which("ffmpeg") is None, reason="needs ffmpeg")
+@pytest.mark.usefixtures("few_pictures")
 def test_a_film_is_written(folder, tmp_path):
     """An MP4 file names its type in its first bytes."""
     out = tmp_path / "job.mp4"

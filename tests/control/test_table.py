@@ -14,12 +14,12 @@ BEAM = "chaosgym/ImpactBeamTolerance-v1"
 @pytest.fixture(scope="module")
 def tables():
     """Of few jobs."""
-    return learned_tables(BEAM, jobs=128)
+    return learned_tables(BEAM, jobs=48)
 
 
 def test_the_clearance_is_found(tables):
     """The likeliest class lies within a tenth of the range of the true clearance on most machines, unlike a guess."""
-    rule, machines = Table(tables), range(32)
+    rule, machines = Table(tables), range(16)
     play(rule, BEAM, machines, steps=40)
     variants = native_envs(BEAM).settings.variants
     clearance = np.array([variants.held_out(k).clearance for k in machines])
@@ -30,7 +30,7 @@ def test_the_clearance_is_found(tables):
 
 def test_it_wins_on_machines_like_those_it_saw(tables):
     """Fewer irregular cycles than following the demand, and a better return, on machines kept for evaluation."""
-    rule, follow = (play(player, BEAM, range(32)) for player in (Table(tables), Follow()))
+    rule, follow = (play(player, BEAM, range(16), steps=60) for player in (Table(tables), Follow()))
     assert rule.type_iii_share.mean() < 0.5 * follow.type_iii_share.mean()
     assert rule.returns.mean() > follow.returns.mean() + 2.0
 

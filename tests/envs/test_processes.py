@@ -27,9 +27,10 @@ if __name__ == "__main__":
     alone = gym.make(ID)
     alone.reset(seed=0)
     alone.step(0)
-    after_one = workers()
+    after_one = workers() if "{context}" == "fork" else None  # the others take nothing over
     here = play(gym.make_vec(ID, num_envs=2))
-    assert np.array_equal(after_one, here) and np.array_equal(workers(), here)
+    assert after_one is None or np.array_equal(after_one, here)
+    assert np.array_equal(workers(), here)
     print("equal")
 """
 
@@ -66,20 +67,21 @@ def test_a_worker_that_imports_nothing_needs_an_id_that_does(name, found):
     code = (
         "import gymnasium as gym, chaosgym\n"
         f"make = lambda: gym.make({name!r})\n"
-        "envs = gym.vector.AsyncVectorEnv([make] * 2, context='spawn')\n"
+        "envs = gym.vector.AsyncVectorEnv([make], context='spawn')\n"
         "print(envs.reset(seed=0)[0].shape)\n"
         "envs.close()"
     )
     done = _run("-c", code)
-    assert (done.stdout == "(2, 14)\n") == found, done.stderr
+    assert (done.stdout == "(1, 14)\n") == found, done.stderr
     assert ("NamespaceNotFound" in done.stderr) != found
 
 
 def test_human_mode_runs_without_a_screen():
-    """On a headless computer human mode draws every environment without opening a window and without a warning."""
+    """On a headless computer human mode draws every machine without opening a window and without a warning."""
+    drawn = [name for name in ENVIRONMENTS if name.endswith("Tolerance-v1")]  # tasks of a machine are drawn alike
     code = (
         "import chaosgym, gymnasium, matplotlib.pyplot\n"
-        f"for name in {sorted(ENVIRONMENTS)}:\n"
+        f"for name in {drawn}:\n"
         "    env = gymnasium.make(name, render_mode='human')\n"
         "    env.reset(seed=0)\n"
         "    env.step(env.action_space.sample())\n"
@@ -91,4 +93,4 @@ def test_human_mode_runs_without_a_screen():
     done = subprocess.run(
         [sys.executable, "-W", "error", "-c", code], env={**known, "MPLBACKEND": "agg"}, capture_output=True, text=True
     )
-    assert done.stdout.splitlines() == ["None []"] * len(ENVIRONMENTS), done.stderr
+    assert done.stdout.splitlines() == ["None []"] * len(drawn), done.stderr

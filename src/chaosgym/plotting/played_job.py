@@ -128,13 +128,19 @@ def _write_film(jobs: Jobs, file: Path) -> None:
 
 
 def _frames(jobs: Jobs) -> Iterator[Figure]:
-    """One figure, drawn anew for each picture of an animation."""
+    """One figure, drawn anew for each picture of an animation; axes stay where they are of the whole jobs."""
     figure = _blank(jobs)
+    draw_jobs(jobs, figure)
+    figure.draw_without_rendering()  # makes the layout, which takes longer than the rest of a picture
+    figure.set_layout_engine("none")
+    places = [axes.get_position() for axes in figure.axes]
     length = max(len(job.speed) for job in jobs.values())
     steps = np.unique(np.linspace(1, length, FRAMES).round().astype(int)).tolist()
     for count in tqdm(steps, desc="draw", unit="picture"):
         figure.clear()
         draw_jobs(jobs, figure, count)
+        for axes, place in zip(figure.axes, places, strict=True):
+            axes.set_position(place)
         yield figure
 
 
