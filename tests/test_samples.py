@@ -24,8 +24,8 @@ def test_a_sample_is_decided_without_a_condition(nature):
 
 
 def test_other_errors_of_the_sensor_give_the_same_verdicts():
-    """The machine decides, not the seed: seven other noises leave both natures as they are."""
-    for seed in range(1, 8):
+    """The machine decides, not the seed: three other noises leave both natures as they are."""
+    for seed in range(1, 4):
         for file, text in recordings(seed).items():
             peaks = np.array(text.splitlines()[3:], float)
             assert judge_peaks(peaks, sensor_error=1.0).diagnosis.words == NATURES[file.removesuffix(".csv")], seed

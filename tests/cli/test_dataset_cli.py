@@ -24,7 +24,7 @@ SWEEP = (
     "--budget",
     "100",
     "--label",
-    "full-types=0.9",
+    "full-types=0.3",
 )
 
 
@@ -43,7 +43,7 @@ def test_info_tells_rows_classes_settings_and_faults(folder):
     assert sum(info["classes"]["nature"].values()) == 50
     assert sum(sum(part.values()) for part in info["classes"]["nature_by_split"].values()) == 50
     assert info["faults"]["failed"] == 0
-    assert info["types"]["points"] == 10
+    assert info["types"]["points"] == 5
     assert info["two_step"]["rows"] + info["two_step"]["undetermined"] == 50
     assert info["two_step"]["agreement"] > 0.9
     assert sum(info["classes"]["response_type"].values()) == 10
@@ -98,7 +98,7 @@ def test_map_is_drawn(folder, tmp_path):
     assert run("dataset", "map", str(folder), "--out", str(tmp_path / "m.png"))[0] == 0
     assert (tmp_path / "m.png").read_bytes().startswith(b"\x89PNG")
     grid = ("sweep", "impact-beam", "--axis", "excitation_frequency=18:30:3", "--axis", "clearance=1e-4:1.4e-4:2")
-    run(*grid, "--budget", "100", "--out", str(tmp_path / "g"))
+    run(*grid, "--budget", "100", "--label", "full-types=0", "--out", str(tmp_path / "g"))
     assert run("dataset", "map", str(tmp_path / "g"), "--out", str(tmp_path / "g.png"))[0] == 0
     assert run("dataset", "map", str(folder), "--out", str(tmp_path / "m.xyz"))[0] == 2
 

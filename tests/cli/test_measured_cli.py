@@ -35,9 +35,9 @@ def written(record, path, style):
         path.with_suffix(".npy").rename(path)
 
 
-def check_files(seeds, tmp_path):
+def check_files(seeds, tmp_path, kinds=tuple(kind for kind in KINDS if "simulated" not in kind)):
     """All three commands say the same nature and period of every file, and a record's life changes nothing of it."""
-    for number, (kind, seed) in enumerate((kind, seed) for seed in seeds for kind in KINDS if "simulated" not in kind):
+    for number, (kind, seed) in enumerate((kind, seed) for seed in seeds for kind in kinds):
         record = make(kind, 6000 + seed)
         path = tmp_path / f"{number}.txt"
         written(record, path, number % 5)
@@ -56,8 +56,8 @@ def check_files(seeds, tmp_path):
 
 
 def test_three_commands_give_one_answer(tmp_path):
-    """Ten files of every kind of trouble, in five dialects."""
-    check_files(range(1), tmp_path)
+    """Five files of as many kinds of trouble, each in another dialect; the hundred files have them all."""
+    check_files(range(1), tmp_path, ("strong chaos", "spikes", "drift", "quantised", "missing cycles"))
 
 
 @pytest.mark.slow
@@ -211,7 +211,9 @@ def test_units_are_understood_by_options_fields_and_axes(tmp_path):
         assert parameters["clearance"] == pytest.approx(1e-4, rel=1e-12)
         assert parameters["excitation_frequency"] == pytest.approx(19.0, rel=1e-12)
     axes = ("--axis", "clearance=0.1 mm:120um:2", "--axis", "excitation_frequency=600 rpm:20 Hz:2")
-    code, _, err = run("sweep", "impact-beam", *axes, "--budget", 100, "--out", tmp_path / "s")
+    code, _, err = run(
+        "sweep", "impact-beam", *axes, "--budget", 100, "--label", "full-types=0", "--out", tmp_path / "s"
+    )
     assert code == 0, err
     table = pq.read_table(tmp_path / "s" / "sweep.parquet")
     assert sorted(set(table["excitation_frequency"].to_pylist())) == [10.0, 20.0]
@@ -269,7 +271,9 @@ def test_both_surfaces_tell_what_neither_tells_alone(tmp_path):
 def test_what_a_sweep_wrote_is_classified(tmp_path):
     """Every row of a sweep describes its machine, so that ``classify --batch`` reads it."""
     axes = ("--axis", "clearance=0.1 mm:0.12 mm:2", "--axis", "excitation_frequency=10:20:2")
-    assert run("sweep", "impact-beam", *axes, "--budget", 100, "--out", tmp_path / "s")[0] == 0
+    assert (
+        run("sweep", "impact-beam", *axes, "--budget", 100, "--label", "full-types=0", "--out", tmp_path / "s")[0] == 0
+    )
     out = tmp_path / "answers.parquet"
     code, _, err = run("classify", "impact-beam", "--batch", tmp_path / "s" / "sweep.parquet", "--out", out)
     assert code == 0, err
@@ -278,11 +282,11 @@ def test_what_a_sweep_wrote_is_classified(tmp_path):
     assert answers["clearance"].to_pylist() == pq.read_table(tmp_path / "s" / "sweep.parquet")["clearance"].to_pylist()
 
 
-COARSE = ("--axis", "clearance=0.1 mm:0.14 mm:2", "--axis", "excitation_frequency=4:30:4:log")
+COARSE = ("--axis", "clearance=0.1 mm:0.14 mm:2", "--axis", "excitation_frequency=4:26:2:log")
 
 
 def test_a_coarse_sweep_types_its_points_by_runs_of_their_own(tmp_path):
-    """Speeds 37 % apart are no neighbours; eight points take seconds, so each is judged over its own tolerances."""
+    """Speeds of 4 and 26 Hz are no neighbours; four points take seconds, so each is judged over its own tolerances."""
     command = ("sweep", "impact-beam", *COARSE, "--budget", 100, "--out", tmp_path / "s", "--json")
     code, out, err = run(*command)
     assert code == 0, err

@@ -120,8 +120,8 @@ def matlab(path, variables):
 
 
 def matlab_of_zeros(path):
-    """Four hundred and ten million bytes of zeros."""
-    matlab(path, [variable(6, (410_000_000, 1), element(2, bytes(410_000_000)))])
+    """Two hundred and ten million bytes of zeros."""
+    matlab(path, [variable(6, (210_000_000, 1), element(2, bytes(210_000_000)))])
 
 
 def matlab_of_cells(path):
@@ -155,8 +155,8 @@ def workbook(path, rows):
 
 
 def excel_of_many_rows(path):
-    """Six million rows; a sheet of Excel has 1,048,576."""
-    workbook(path, 600 * [10_000 * b"<row><c><v>1</v></c></row>"])
+    """More than five million rows; a sheet of Excel has 1,048,576."""
+    workbook(path, 510 * [10_000 * b"<row><c><v>1</v></c></row>"])
 
 
 def excel_of_wide_rows(path):
@@ -207,7 +207,7 @@ BOMBS = {
 """Files that claim much, and what is said of each; a column of text is left out."""
 
 WATCHED = """
-import resource, sys, time
+import os, resource, sys, time
 from chaosgym.errors import DiagnosisError
 from chaosgym.recordings import formats
 from chaosgym.recordings.read import read_recording
@@ -216,29 +216,46 @@ for module in ("pyarrow.parquet", "scipy.io", "h5py", "openpyxl", "soundfile"):
         __import__(module)
     except ImportError:
         pass
-before = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss
-began = time.process_time()
-try:
-    said = repr(read_recording(sys.argv[1]))
-except DiagnosisError as error:
-    said = str(error)
-used = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss - before
-print(used * 1024, time.process_time() - began)
-print(said)
+
+def read(path):
+    before = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss
+    began = time.process_time()
+    try:
+        said = repr(read_recording(path))
+    except DiagnosisError as error:
+        said = str(error)
+    used = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss - before
+    print(used * 1024, time.process_time() - began)
+    print(said, flush=True)
+
+for line in sys.stdin:
+    if (child := os.fork()) == 0:
+        read(line.rstrip("\\n"))
+        os._exit(0)
+    print(f"ended with {os.waitpid(child, 0)[1]}", flush=True)
 """
 
 
+@pytest.fixture(scope="module")
+def watched():
+    """What reads each file of a path in a process of its own, whose memory and time it says; all modules are loaded."""
+    with subprocess.Popen(
+        [sys.executable, "-c", WATCHED], stdin=subprocess.PIPE, stdout=subprocess.PIPE, text=True
+    ) as process:
+        yield process
+        process.stdin.close()
+
+
 @pytest.mark.parametrize("kind", BOMBS)
-def test_a_file_that_claims_much_is_refused_before_it_is_read(kind, tmp_path):
+def test_a_file_that_claims_much_is_refused_before_it_is_read(kind, tmp_path, watched):
     """One line, in seconds, with little memory beside what the file itself takes."""
     make, told = BOMBS[kind]
     path = tmp_path / "record"
     make(path)
-    run = subprocess.run([sys.executable, "-c", WATCHED, str(path)], capture_output=True, text=True, timeout=120)
-    assert run.returncode == 0, run.stderr[-2000:]
-    figures, said = run.stdout.split("\n", 1)
+    print(path, file=watched.stdin, flush=True)
+    figures, said, *more = iter(watched.stdout.readline, "ended with 0\n")
     used, seconds = map(float, figures.split())
-    assert said.count("\n") == 1
+    assert more == []
     assert told in said
     assert used < 2.5e8 + 2 * path.stat().st_size * (kind != "text_of_many_entries"), f"{used / 1e6:.0f} MB"
     assert seconds < 30.0
@@ -261,18 +278,15 @@ LETTERS = " _([])/1,.;\"':#%-+eE\tnN"
 
 
 def seconds(work):
-    """Least processor time of three calls."""
-    taken = []
-    for _ in range(3):
-        began = time.process_time()
-        work()
-        taken.append(time.process_time() - began)
-    return min(taken)
+    """Processor time of a call."""
+    began = time.process_time()
+    work()
+    return time.process_time() - began
 
 
 def proportional(read, count, what):
     """Whether twice as many letters take less than three times as long; a busy computer may ask for another look."""
-    return any(read(2 * count, what) < 3.0 * read(count, what) + 0.01 for _ in range(5))
+    return any(read(2 * count, what) < 3.0 * read(count, what) + 0.01 for _ in range(15))
 
 
 def answer(read, *values, **named):

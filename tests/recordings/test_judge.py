@@ -60,8 +60,8 @@ def check(counts, wrong):
 
 
 def test_records_of_known_nature_are_judged_rightly():
-    """One record of every other kind of noise and of published systems: none is judged wrongly."""
-    for module, kinds in ((process_records, process_records.KINDS[::2]), (held_out, held_out.KINDS[:-1:3])):
+    """One record of every fourth kind of noise and sixth of published systems: none is judged wrongly."""
+    for module, kinds in ((process_records, process_records.KINDS[::4]), (held_out, held_out.KINDS[:-1:6])):
         _, wrong = judged(module, kinds, range(7000, 7001))
         assert not wrong
 
@@ -368,7 +368,7 @@ def _logistic(parameter, seed, cycles=150):
 
 def test_a_pattern_that_was_left_before_is_periodic_under_a_condition():
     """Beside the tangent bifurcation at 3.8284 a pattern of three cycles is left and found again, for ever."""
-    found = [judge_peaks(_logistic(3.8284, seed), sensor_error=0.4).diagnosis for seed in range(24)]
+    found = [judge_peaks(_logistic(3.8284, seed), sensor_error=0.4).diagnosis for seed in range(8)]
     left = [one for one in found if "does not leave its pattern again, as before cycle" in one.condition]
     assert left
     assert all((one.nature, one.period) == ("periodic", 3) for one in left)
@@ -418,13 +418,13 @@ def test_a_pattern_after_a_burst_is_periodic_under_a_condition_only(stated):
     """Wherever a record of 100 or 300 cycles begins amid bursts, its laminar phases are no certain period three."""
     rng, bursts = np.random.default_rng(12), 0
     for cycles in (100, 300):
-        for _ in range(8):
+        for _ in range(3):
             series = laminar(rng.uniform(0.2, 0.9), 400 + cycles)[-cycles:]
             found = judge_peaks(series + rng.uniform(-0.4, 0.4, cycles), **stated).diagnosis
             burst = np.abs(series[3:] - series[:-3]).max() > 2.5
             bursts += burst
             assert not burst or found.nature != "periodic" or found.condition
-    assert bursts >= 8
+    assert bursts >= 3
 
 
 def test_a_response_that_nears_its_pattern_has_settled():

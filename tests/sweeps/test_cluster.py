@@ -9,6 +9,7 @@ import pytest
 
 from chaosgym.machines import ImpactBeam
 from chaosgym.sweeps import Axis, SweepPlan, read_sweep, run_sweep
+from tests.cli.run import run
 
 POINTS = 1100
 COMMAND = (
@@ -96,26 +97,27 @@ def scheduler_workers(address):
 def test_rows_of_a_cluster_that_loses_a_worker_are_those_of_one_process(cluster, tmp_path):
     """One of two workers is killed half way: nothing is lost, nothing twice, and every row is the local run's."""
     address, workers, _ = cluster
-    run = subprocess.Popen(
+    command = subprocess.Popen(
         [*COMMAND, "--workers", address, "--out", str(tmp_path / "c")], stdout=subprocess.PIPE, stderr=subprocess.PIPE
     )
     wait_until(lambda: list(tmp_path.glob("c/chunks/0*.parquet")), 400.0)
     workers[0].kill()
-    _, errors = run.communicate(timeout=600)
-    assert run.returncode == 0, errors.decode()
+    _, errors = command.communicate(timeout=600)
+    assert command.returncode == 0, errors.decode()
     axes = (Axis("excitation_frequency", 10.0, 30.0), Axis("clearance", 5e-5, 2e-4))
     local = run_sweep(SweepPlan(ImpactBeam(), axes, "random", POINTS, 4, budget=100), tmp_path / "l")
     assert read_sweep(tmp_path / "c").table.equals(local.table)
     assert len(local.table) == POINTS
 
 
-def test_a_missing_scheduler_is_one_line(tmp_path):
+def test_a_missing_scheduler_is_one_line(tmp_path, monkeypatch):
     """Nobody listens at port 1: exit code 2, the address is named, and the folder can be used without a cluster."""
-    command = [*COMMAND, "--workers", "tcp://127.0.0.1:1", "--out", str(tmp_path / "c")]
-    run = subprocess.run(command, capture_output=True, text=True)
-    assert run.returncode == 2
-    assert "no Dask scheduler answers at tcp://127.0.0.1:1" in run.stderr
-    assert "Traceback" not in run.stderr
+    monkeypatch.setattr("chaosgym.sweeps.run.CONNECT_SECONDS", 0.5)
+    code, out, err = run(*COMMAND[3:], "--workers", "tcp://127.0.0.1:1", "--out", tmp_path / "c")
+    assert (code, out) == (2, "")
+    told = err.splitlines()
+    assert told[-1].startswith("Error: no Dask scheduler answers at tcp://127.0.0.1:1: ")
+    assert "Traceback" not in err
     assert not (tmp_path / "c").exists()
 
 
@@ -123,15 +125,15 @@ def test_a_missing_scheduler_is_one_line(tmp_path):
 def test_a_dead_scheduler_is_one_line(cluster, tmp_path):
     """Killed while its workers compute: exit code 1, one line beside the progress, the plan stays."""
     address, _, scheduler = cluster
-    run = subprocess.Popen(
+    command = subprocess.Popen(
         [*COMMAND, "--workers", address, "--out", str(tmp_path / "c")], stdout=subprocess.PIPE, stderr=subprocess.PIPE
     )
     wait_until((tmp_path / "c" / "chunks").is_dir)
     time.sleep(1.0)
     scheduler.kill()
-    _, errors = run.communicate(timeout=120)
+    _, errors = command.communicate(timeout=120)
     told = [line for line in errors.decode().replace("\r", "\n").split("\n") if line and not line.startswith("sweep:")]
-    assert run.returncode == 1
+    assert command.returncode == 1
     assert len(told) == 1, "\n".join(told[-16:])
     assert "gave up" in told[0]
     assert "run the same command again" in told[0]

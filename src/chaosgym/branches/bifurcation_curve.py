@@ -124,11 +124,10 @@ def follow_bifurcation(
     Examples
     --------
     >>> from chaosgym.branches.bifurcation_curve import follow_bifurcation
-    >>> beam = chaosgym.ImpactBeam()
-    >>> diagram = chaosgym.follow(beam, "speed", (20.0, 20.3))
-    >>> folds = [one for one in diagram.bifurcations if one.kind == "fold" and one.period == 1]
-    >>> fold = next(one for one in folds if one.value > 20.2)  # rounding decides whether narrower ones are met
-    >>> curve = follow_bifurcation(beam, fold, "speed", "clearance", (1.2e-4, 1.3e-4), steps=3)
+    >>> beam = chaosgym.ImpactBeam(n_modes=1, fitted_modes=0)
+    >>> diagram = chaosgym.follow(beam, "speed", (14.2, 14.3))
+    >>> fold = next(one for one in diagram.bifurcations if one.kind == "fold")
+    >>> curve = follow_bifurcation(beam, fold, "speed", "clearance", (1.25e-4, 1.28e-4), steps=3)
     >>> curve.kind
     'fold'
     """

@@ -212,7 +212,7 @@ def combination(
     >>> from chaosgym.design import assess
     >>> from chaosgym.design.combination import combination
     >>> found = assess(chaosgym.ImpactBeam(excitation_frequency=10.0), series_size=4)
-    >>> combination(found, base=16).types["I"].share
+    >>> combination(found, base=8).types["I"].share
     1.0
     """
     runs = found.series.runs or (found.nominal,)
@@ -280,7 +280,7 @@ def influences(
     >>> from chaosgym.design.combination import influences
     >>> from chaosgym.diagnosis import Tolerance
     >>> region = {"clearance": Tolerance(0.05), "length": Tolerance(0.001)}
-    >>> found = influences(chaosgym.ImpactBeam(excitation_frequency=10.0), region, 10.0 / 3.0, base=16)
+    >>> found = influences(chaosgym.ImpactBeam(excitation_frequency=10.0), region, 10.0 / 3.0, base=8)
     >>> [one.parameter for one in found]
     ['clearance', 'length']
     """

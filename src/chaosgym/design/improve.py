@@ -101,8 +101,8 @@ def improve(
     >>> from chaosgym.design import Criteria, assess
     >>> from chaosgym.design.improve import improve
     >>> beam = chaosgym.ImpactBeam(excitation_frequency=20.0)
-    >>> found = assess(beam, criteria=Criteria(load_rating=60.0, life=5.0), series_size=4)
-    >>> improvement = improve(found, {"excitation_frequency": [12.0]}, series_size=4)
+    >>> found = assess(beam, criteria=Criteria(load_rating=60.0, life=5.0), series_size=2)
+    >>> improvement = improve(found, {"excitation_frequency": [12.0]}, series_size=2)
     >>> found.verdict, improvement.suggestions[0].assessment.verdict
     ('fails', 'fails')
     """

@@ -10,6 +10,7 @@ updates of these matrices. Each update disturbs the motion a little, so the two 
                  runs that repeat are periodic even if they differ; two that do not repeat and part are chaotic.
 """
 
+import math
 from functools import partial
 from typing import Any, Literal
 
@@ -156,7 +157,7 @@ def compare_attractors(first: ArrayLike, second: ArrayLike) -> Diagnosis:
     if any(period is not None for period in periods):
         return judged(nature="undetermined", margin=0.0, reason="one run repeats, the other does not")
     reason = f"neither run repeats, and they part by {distance / scale:.0%} of the largest peak"
-    return judged(nature="chaotic", margin=float(np.clip(np.log10(apart), 0.0, 1.0)), reason=reason)
+    return judged(nature="chaotic", margin=float(np.clip(math.log10(apart), 0.0, 1.0)), reason=reason)
 
 
 def _pair(first: ArrayLike, second: ArrayLike) -> tuple[Array, Array, float]:

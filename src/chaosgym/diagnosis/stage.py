@@ -1,5 +1,6 @@
 """What a stage of a diagnosis tells: the verdict by its run, its exponent and its orbit, and the vote of each test."""
 
+import math
 from dataclasses import dataclass, replace
 from typing import Any
 
@@ -142,7 +143,7 @@ def lasting_margin(cycles: int) -> float:
     >>> [round(lasting_margin(cycles), 2) for cycles in (150, 3200, 15000)]
     [0.0, 0.66, 1.0]
     """
-    return float(np.clip(0.5 * np.log10(1.0 / escape_rate(cycles) / INITIAL_TRANSIENT), 0.0, 1.0))
+    return float(np.clip(0.5 * math.log10(1.0 / escape_rate(cycles) / INITIAL_TRANSIENT), 0.0, 1.0))
 
 
 def not_periodic(stage: Stage) -> Diagnosis:

@@ -1,7 +1,6 @@
 """The operating points at which rungs are compared: the same every time, a third of them chaotic."""
 
 import numpy as np
-from scipy.stats import qmc
 
 from chaosgym.arrays import Array
 from chaosgym.machines import Machine
@@ -18,6 +17,8 @@ MAX_DRAWS = 20
 
 def operating_points(machine: Machine, count: int) -> Array:
     """Speeds and clearances over the usual ranges, (count, 2): a Halton sequence, even in the logarithm."""
+    from scipy.stats import qmc  # slow to import
+
     whole("points", count, 1, 10**6)
     low, high = np.log([machine.usual_ranges[f] for f in (machine.speed_field, machine.clearance_field)]).T
     spread = qmc.Halton(2, scramble=False).random(count + 1)[1:]

@@ -180,9 +180,9 @@ def model_fit(
     Examples
     --------
     >>> from chaosgym.fit.model_fit import model_fit
-    >>> beam = chaosgym.ImpactBeam(excitation_frequency=12.0)
-    >>> noise = np.random.default_rng(1).normal(size=64)
-    >>> found = model_fit(beam, chaosgym.simulate(beam, 64, transient=100).peak_force[:, 0] * (1.0 + 0.01 * noise))
+    >>> beam = chaosgym.ImpactBeam(excitation_frequency=12.0, n_modes=1, fitted_modes=0)
+    >>> noise = np.random.default_rng(1).normal(size=32)
+    >>> found = model_fit(beam, chaosgym.simulate(beam, 32, transient=100).peak_force[:, 0] * (1.0 + 0.01 * noise))
     >>> found.nature, found.period
     ('periodic', 1)
     """

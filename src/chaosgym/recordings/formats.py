@@ -168,7 +168,7 @@ def _channel(file: Any, group: int, channel: int, count: int) -> tuple[Any, str,
 def hdf(data: Data) -> Raw:
     """Data sets of an HDF5 file, that of MATLAB 7.3 included."""
     form, what = ("MATLAB 7.3", "a MATLAB file of version 7.3") if data[:6] == b"MATLAB" else ("HDF5", "an HDF5 file")
-    h5py, raw, size = needed("h5py", what), Raw(form), 0
+    h5py, raw, size, sets = needed("h5py", what), Raw(form), 0, list[tuple[str, Any]]()
 
     def take(path: str, item: Any) -> None:
         if not isinstance(item, h5py.Dataset):
@@ -185,12 +185,14 @@ def hdf(data: Data) -> Raw:
         nonlocal size
         size += item.size
         check_readings(size)
-        *groups, title = re.split(r"(?<! )/(?! )", path)
-        raw.add(title, item[()], dict(item.attrs), "/".join(groups))
+        sets.append((path, item))
 
     with h5py.File(stream(data), "r") as file:
         take("", file)
         file.visititems(take)
+        for path, item in sets:
+            *groups, title = re.split(r"(?<! )/(?! )", path)
+            raw.add(title, item[()], dict(item.attrs), "/".join(groups))
     return raw
 
 

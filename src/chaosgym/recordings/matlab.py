@@ -26,6 +26,11 @@ MOST_CONTAINERS, MOST_CELLS, MOST_ELEMENTS = 1000, 1_000_000, 2_000_000
 MOST_BYTES = 4 * MOST_READINGS
 """Bytes to which the variables of a file may unpack: SciPy holds them twice."""
 
+UNPACKS = f"unpacks to more than {MOST_BYTES:,} bytes, which are allowed"
+
+PIECE = 2**20
+"""Bytes that are unpacked at once."""
+
 HEAD = 128
 """Bytes before the first variable."""
 
@@ -90,16 +95,23 @@ def _variables(data: Data, order: str) -> Iterator[bytes]:
     while place + 8 <= len(data):
         kind, size = struct.unpack_from(order + "II", data, place)
         content = data[place + 8 : place + 8 + size]
-        if kind == PACKED:
-            unpack = zlib.decompressobj()
-            content = unpack.decompress(content, room + 1)
-        else:
-            content = data[place : place + 8 + size]
+        content = _unpacked(content, room) if kind == PACKED else data[place : place + 8 + size]
         room -= len(content)
         if room < 0:
-            raise TooMuch(f"unpacks to more than {MOST_BYTES:,} bytes, which are allowed")
+            raise TooMuch(UNPACKS)
         yield content
         place += 8 + size
+
+
+def _unpacked(content: Data, room: int) -> bytes:
+    """Content of a packed element, piece by piece, so that no more is held than there is room for."""
+    unpack, parts, rest = zlib.decompressobj(), list[bytes](), content
+    while part := unpack.decompress(rest, PIECE):
+        room, rest = room - len(part), unpack.unconsumed_tail
+        if room < 0:
+            raise TooMuch(UNPACKS)
+        parts.append(part)
+    return b"".join(parts)
 
 
 def _elements(variable: bytes, order: str) -> Iterator[tuple[int, int]]:

@@ -23,6 +23,8 @@ from chaosgym.sweeps.plan import SweepPlan
 
 PLAN_FILE = "plan.json"
 CHUNK_FOLDER = "chunks"
+SWEEP = "run of this sweep"
+"""What a folder holds that may be written into."""
 
 LARGEST_PLAN = 10_000_000
 """Bytes that a plan may have."""

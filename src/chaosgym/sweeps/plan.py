@@ -17,7 +17,6 @@ from typing import Any, Literal, get_args
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.stats import qmc
 
 from chaosgym.arrays import Array
 from chaosgym.diagnosis import default_tolerances
@@ -227,6 +226,8 @@ class SweepPlan:
             bits: Any = generator.bit_generator
             bits.advance(start * dimensions)
             return generator.random((stop - start, dimensions))
+        from scipy.stats import qmc  # slow to import, and few plans need it
+
         sequence = qmc.Sobol(dimensions, rng=generator)
         if start:
             return np.asarray(sequence.fast_forward(start).random(stop - start))

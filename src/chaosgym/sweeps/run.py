@@ -17,7 +17,7 @@ from chaosgym.errors import DatasetError, UnfinishedError
 from chaosgym.files import claimed, held
 from chaosgym.simulation.parallel import number_of_workers
 from chaosgym.sweeps.dataset import LabelledSweep, read_sweep
-from chaosgym.sweeps.folder import CHUNK_FOLDER, PLAN_FILE, SweepFolder
+from chaosgym.sweeps.folder import CHUNK_FOLDER, PLAN_FILE, SWEEP, SweepFolder
 from chaosgym.sweeps.label import label_rows
 from chaosgym.sweeps.plan import SweepPlan, spread
 from chaosgym.version import __version__
@@ -41,7 +41,7 @@ def on_threads(
         running = {pool.submit(label_rows, plan, rows, stop, known): rows for rows in islice(waiting, 2 * threads)}
         while running:
             done: set[Future[pa.Table]] = wait(running, return_when=FIRST_COMPLETED).done
-            for future in done:
+            for future in sorted(done, key=lambda one: one.exception() is not None):  # so that an error costs no chunk
                 rows = running.pop(future)
                 running |= {pool.submit(label_rows, plan, rows, stop, known): rows for rows in islice(waiting, 1)}
                 yield rows, future.result()
@@ -157,7 +157,7 @@ def run_sweep(
     threads = number_of_workers(workers)
     with (
         cluster_at(scheduler) if scheduler else nullcontext() as client,
-        held(claimed(folder, PLAN_FILE, what="run of this sweep"), CHUNK_FOLDER),
+        held(claimed(folder, PLAN_FILE, what=SWEEP), CHUNK_FOLDER),
     ):
         store = SweepFolder(folder, plan, __version__)
         missing = store.missing(repair=repair)

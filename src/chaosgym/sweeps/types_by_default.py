@@ -16,8 +16,9 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from chaosgym.errors import ParameterError
+from chaosgym.files import claimed
 from chaosgym.simulation.parallel import number_of_workers, parallel_map
-from chaosgym.sweeps.folder import PLAN_FILE, read_plan_file
+from chaosgym.sweeps.folder import PLAN_FILE, SWEEP, read_plan_file
 from chaosgym.sweeps.label import full_type
 from chaosgym.sweeps.plan import SweepPlan, spread
 
@@ -69,11 +70,11 @@ def with_affordable_types(plan: SweepPlan, folder: str | Path, workers: int | No
     Raises
     ------
     DatasetError
-        If the folder's plan can't be read.
+        If the folder's plan can't be read, or it holds anything else: nothing is timed for a sweep that can't be kept.
     """
     if plan.sampling != "grid" or plan.type_reach():
         return TypesByDefault(plan, None)
-    held = Path(folder) / PLAN_FILE
+    held = claimed(folder, PLAN_FILE, what=SWEEP) / PLAN_FILE
     if held.is_file():
         share = read_plan_file(held).get("full_types")
         return TypesByDefault(replace(plan, full_types=1.0) if share == 1.0 else plan, None)
