@@ -235,6 +235,7 @@ def test_the_page_fits(address, browser):
     browser.wait(deep("all(document, '.noUi-handle').every(node => node.getAttribute('aria-label'))"))
     labels = browser.value(deep("all(document, '.noUi-handle').map(node => node.getAttribute('aria-label'))"))
     assert len(set(labels)) == 3
+    assert browser.value("Bokeh.documents[0].get_model_by_name('pause').active") is False, "little motion is wanted"
     for width, columns in ((1280, 3), (400, 1)):
         browser.resize(width)
         places = deep("new Set(all(document, '.bk-Figure').map(n => Math.round(middle(n)[0] / 20))).size")
