@@ -73,7 +73,7 @@ class Browser:
     def visit(self, address: str, screenshot: Path | None = None, width: int = 1200) -> Visit:
         """Open a page and wait until it has loaded."""
         self.events.clear()
-        self._call("Emulation.setDeviceMetricsOverride", width=width, height=900, deviceScaleFactor=1, mobile=False)
+        self.resize(width)
         self._call("Page.navigate", url=address)
         while not any(event["method"] == "Page.loadEventFired" for event in self.events):
             self.events.append(self._message())
@@ -82,9 +82,17 @@ class Browser:
             self.picture(screenshot)
         return seen
 
+    def resize(self, width: int) -> None:
+        """Make the window as wide as that."""
+        self._call("Emulation.setDeviceMetricsOverride", width=width, height=900, deviceScaleFactor=1, mobile=False)
+
     def media(self, kind: str) -> None:
         """Show pages as on paper ("print") or as usual ("")."""
         self._call("Emulation.setEmulatedMedia", media=kind)
+
+    def motion(self, wanted: str) -> None:
+        """Say how much motion the user wants: "reduce", or "no-preference"."""
+        self._call("Emulation.setEmulatedMedia", features=[{"name": "prefers-reduced-motion", "value": wanted}])
 
     def seen(self) -> Visit:
         """What has happened on the page until now."""

@@ -58,14 +58,14 @@ def test_the_command_draws_curves_over_two_fields(tmp_path):
     """``branch --against`` prints curves, and writes their points and a picture."""
     machine, table, picture = tmp_path / "soft.toml", tmp_path / "curves.csv", tmp_path / "map.png"
     machine.write_text(SOFT_FILE)
-    words = ["branch", str(machine), "--along", "speed=2.2:2.6 Hz:4", "--against", "drive_level=0.5:2:3"]
+    words = ["branch", str(machine), "--along", "speed=2.2:2.4 Hz:3", "--against", "drive_level=0.5:2:2"]
     result = CliRunner().invoke(
         app, [*words, "--workers", "1", "--out", str(table), "--plot", str(picture), "--json"], catch_exceptions=False
     )
     assert result.exit_code == 0, result.output
     told = json.loads(result.stdout)
-    assert len(told["nature"]) == 4
-    assert len(told["nature"][0]) == 3
+    assert len(told["nature"]) == 3
+    assert len(told["nature"][0]) == 2
     assert told["curves"]
     assert table.read_text().startswith('"curve","kind","period","speed","drive_level"')
     assert picture.stat().st_size > 5000

@@ -16,6 +16,7 @@ from chaosgym.plotting.commands import peaks_figure
 from chaosgym.plotting.comparison_report import comparison_report
 from chaosgym.plotting.design_report import design_report
 from tests.cli.run import run
+from tests.design.small import small_studies
 
 CALM = ImpactBeam(excitation_frequency=10.0)
 STEEL = {"strength": 1.6e9, "strength_deviation": 0.1e9, "contact_radius": 8e-3, "contact_modulus": 1.15e11}
@@ -50,7 +51,8 @@ def machine_of(kind, folder):
 )
 def test_a_template_of_each_kind_is_told_and_not_judged(kind, tmp_path):
     """From template to report: forces, types and changes, and no life, reliability or verdict on them."""
-    answer = study(brief_from(quick(template(machine_of(kind, tmp_path)))))
+    with small_studies():
+        answer = study(brief_from(quick(template(machine_of(kind, tmp_path)))))
     found, lines = answer.assessment, answer.lines()
     assert (found.verdict, found.checks, found.criteria.asked) == ("not judged", (), ())
     assert lines[0].endswith("not judged, since no criterion is stated")
@@ -124,7 +126,8 @@ def test_a_criterion_names_its_line(tmp_path):
     path.write_text(
         f'{head}[parameters]\nexcitation_frequency = "10 Hz"\n[criteria]\nload_rating = "500 N"\nlife = "1 h"\n'
     )
-    answer = study(read_brief(path))
+    with small_studies():
+        answer = study(read_brief(path))
     assert answer.lines()[0] == f"impact-beam: meets, judged by fatigue life ({path}:8)"
     assert f"<td>{path}:8</td>" in design_report(answer)
     assert answer.as_dict()["checks"][0]["stated"] == f"{path}:8"

@@ -22,6 +22,7 @@ from chaosgym.diagnosis import Tolerance
 from chaosgym.errors import ParameterError
 from chaosgym.machines import MACHINES, ImpactBeam
 from chaosgym.machines.parameters import with_settings
+from tests.design.small import small_studies
 from tests.plain_modes import PLAIN_BEAM
 
 REGION = {"excitation_frequency": Tolerance(0.02), "clearance": Tolerance(0.05)}
@@ -157,11 +158,12 @@ def test_variation_region_with_two_tolerances_and_wear():
 def test_improve_finds_the_cheapest_change_that_meets_the_criteria(chaotic):
     """Less clearance lowers the force: the change found meets the criteria when assessed anew, and costs the least."""
     changes = {"clearance": [0.03175e-3], "contact_damping": [40.0]}
-    found = improve(chaotic, changes, series_size=8)
+    with small_studies():
+        found = improve(chaotic, changes, series_size=4)
     assert found.best is not None
     assert found.best.meets
     machine = with_settings(ImpactBeam(), found.best.changes)
-    assert assess(machine, chaotic.region, chaotic.criteria, series_size=8).verdict == "meets"
+    assert assess(machine, chaotic.region, chaotic.criteria, series_size=4).verdict == "meets"
     assert found.best.cost <= min(trial.cost for trial in found.suggestions if trial.meets)
     flags = [trial.meets for trial in found.suggestions]
     assert flags == sorted(flags, reverse=True)
@@ -173,7 +175,8 @@ def test_improve_says_so_when_nothing_suffices(chaotic):
     """With changes that do nothing there is no best one, and a seed or value that is the nominal one is none."""
     changes = {"contact_damping": [22.0, chaotic.machine.contact_damping], "damping_ratio": [0.011]}
     same = [{"excitation_frequency": 30.0}, {"clearance": 0.127e-3, "damping_ratio": 0.0105}]
-    found = improve(chaotic, changes, seeds=same, series_size=4)
+    with small_studies():
+        found = improve(chaotic, changes, seeds=same, series_size=4)
     assert found.best is None
     assert all({"excitation_frequency", "clearance"}.isdisjoint(trial.changes) for trial in found.suggestions)
     assert all(trial.cost > 0.0 for trial in found.suggestions)

@@ -16,7 +16,7 @@ from tests.branches.test_branch import oscillator
 from tests.diagnosis.coexisting import RATIO, trilinear
 
 
-def farthest(force, ratio, x, v, cycles=120, steps=500):
+def farthest(force, ratio, x, v, cycles=90, steps=500):
     """Largest displacement in the last four cycles of a drive, by RK4 in fixed steps; unit masses."""
     h, largest = 2.0 * np.pi / ratio / steps, np.full(np.shape(x), -np.inf)
     for step in range(steps * cycles):

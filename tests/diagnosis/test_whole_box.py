@@ -83,7 +83,7 @@ def test_what_dies_within_a_cycle_is_a_certified_period(fields):
     assert exponent is None or (math.isfinite(exponent) and exponent < 0.0)
 
 
-@settings(max_examples=12, deadline=None, suppress_health_check=list(HealthCheck))
+@settings(max_examples=6, deadline=None, suppress_health_check=list(HealthCheck))
 @example(fields=STILL)
 @example(fields=LAST)
 @example(fields=SLOW_PAIR)

@@ -6,6 +6,12 @@ import subprocess
 import sys
 from contextlib import contextmanager
 
+SMALL = """
+from chaosgym.explore import point, safe
+point.DIAGRAM_POINTS, safe.MOST_STEPS, safe.CLEARANCES = 8, 6, 1
+"""
+"""Before a page of which the orbit diagram and the calm region are not looked at in full: they take half a minute."""
+
 
 @contextmanager
 def served(*arguments, stderr=None, with_process=False, before=""):

@@ -25,6 +25,14 @@ def place():
         yield urlparse(address)
 
 
+@pytest.fixture(scope="module")
+def bounded():
+    """Address of a server that allows three pages, and the number of its process."""
+    three = "import chaosgym.explore.gate as gate; gate.MOST_PAGES = 3"
+    with served("impact-beam", with_process=True, before=three) as both:
+        yield both
+
+
 @contextmanager
 def answer(place, path=None, **headers):
     """Answer to GET of a path, that of the page by default."""
@@ -88,10 +96,9 @@ def test_only_its_own_page_is_answered(place, path, headers, status):
         assert status in (200, 204) or ("token" not in text and text.count("\n") <= 1)
 
 
-def test_the_secret_is_drawn_anew_and_long(place):
+def test_the_secret_is_drawn_anew_and_long(place, bounded):
     """Two servers have two secrets of 128 bits."""
-    with served("impact-beam") as other:
-        assert urlparse(other).path != place.path
+    assert urlparse(bounded[0]).path != place.path
     assert len(place.path) >= 22
 
 
@@ -118,18 +125,17 @@ def _status(process, name):
         return int(re.search(rf"{name}:\s+(\d+)", status.read())[1])
 
 
-def test_asking_for_pages_computes_nothing_and_they_are_bounded():
+def test_asking_for_pages_computes_nothing_and_they_are_bounded(bounded):
     """Where three pages are allowed, six requests give three; none begins to compute."""
-    three = "import chaosgym.explore.gate as gate; gate.MOST_PAGES = 3"
-    with served("impact-beam", with_process=True, before=three) as (address, process):
-        place, threads, answered = urlparse(address), _status(process, "Threads"), []
-        for _ in range(6):
-            with answer(place) as found:
-                answered.append(found.status)
-                text = found.read().decode()
-        assert answered == [200, 200, 200, 503, 503, 503]
-        assert text == "3 pages are open; close one, and open this one again after half a minute\n"
-        assert _status(process, "Threads") == threads, "no page computes that no browser has opened"
+    address, process = bounded
+    place, threads, answered = urlparse(address), _status(process, "Threads"), []
+    for _ in range(6):
+        with answer(place) as found:
+            answered.append(found.status)
+            text = found.read().decode()
+    assert answered == [200, 200, 200, 503, 503, 503]
+    assert text == "3 pages are open; close one, and open this one again after half a minute\n"
+    assert _status(process, "Threads") == threads, "no page computes that no browser has opened"
 
 
 @pytest.mark.slow

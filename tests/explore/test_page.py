@@ -13,7 +13,7 @@ pytest.importorskip("bokeh")
 
 from chaosgym.machines.machine_file import template
 from tests.browser import CHROMIUM, Browser
-from tests.explore.serving import served
+from tests.explore.serving import SMALL, served
 
 pytestmark = pytest.mark.skipif(CHROMIUM is None, reason="chromium is not installed")
 
@@ -39,14 +39,15 @@ HEADLINE = deep("all(document, 'h2').map(node => node.textContent).join()")
 @pytest.fixture(scope="module")
 def address():
     """Address of a page of the beam at 20 Hz."""
-    with served("impact-beam", "--frequency-hz", "20") as address:
+    with served("impact-beam", "--frequency-hz", "20", before=SMALL) as address:
         yield address
 
 
 @pytest.fixture(scope="module")
 def browser(tmp_path_factory):
-    """One browser for all pages."""
+    """One browser for all pages; its user wants little motion, so that no picture is drawn over and over."""
     with Browser(tmp_path_factory.mktemp("profile")) as opened:
+        opened.motion("reduce")
         yield opened
 
 
@@ -94,12 +95,18 @@ def test_the_impacts_are_heard(address, browser):
 
 
 def test_the_page_tells_what_is_calm_and_saves_itself(address, browser):
-    """At 0.127 mm the beam is calm around 10 Hz, and so says the page; its picture and command are files."""
-    browser.visit(address, width=1400)
+    """At 0.127 mm the beam is calm up to 10.61 Hz, and so says the page; its picture and command are files.
+
+    Dragged to another speed, the page says how that one lies to what is calm.
+    """
+    browser.visit(address.partition("?")[0] + "?machine=impact-beam&excitation_frequency=10", width=1400)
     calm = "Bokeh.documents[0].get_model_by_name('calm').text"
-    told = browser.wait(f"{calm}.includes('its own speed') ? {calm} : ''", 300.0)
-    assert "8.706 to 10.82 Hz" in told
-    assert "its own speed, 20 Hz, is in none of these" in told
+    told = browser.wait(f"{calm}.includes('its own speed') ? {calm} : ''")
+    assert "8.88 to 10.61 Hz" in told
+    assert "its own speed, 10 Hz, is 6.1% from an end" in told
+    browser.drag(browser.value(deep("middle(all(document, '.noUi-handle')[0])")), 400.0)
+    told = browser.wait(f"!{calm}.includes('own speed, 10 Hz') ? {calm} : ''")
+    assert "its own speed, 30 Hz, is in none of these" in told
     assert "impact-beam" in browser.value(deep("all(document, 'h1').map(node => node.textContent).join()"))
     browser.value(
         "(() => { window.saved = []; HTMLAnchorElement.prototype.click = function() {"
@@ -134,7 +141,7 @@ def test_the_file_of_a_machine_is_dragged_too(browser, tmp_path):
     """The template has period 2 at 14 Hz and period 1 at 17 Hz; its file is in the address, and no agent plays it."""
     path = tmp_path / "my-machine.toml"
     path.write_text(template())
-    with served(str(path)) as address:
+    with served(str(path), before=SMALL) as address:
         browser.visit(address, width=1400)
         assert browser.wait(f"{HEADLINE}.includes('periodic, period 2 (certified')")
         browser.drag(browser.value(deep("middle(all(document, '.noUi-handle')[0])")), 60.0)
@@ -166,7 +173,8 @@ busy()
 def test_the_links_of_a_mechanism_move(browser):
     """A link moves and stays as long as it is; paused, nothing is drawn or sent, and a slider is followed still."""
     browser.visit("about:blank")  # the page before complains that its server has gone
-    with served("docs/machines/quick-return.toml") as address:
+    browser.motion("no-preference")
+    with served("docs/machines/quick-return.toml", before=SMALL) as address:
         browser.visit(address, width=1400)
         assert browser.wait(f"{HEADLINE}.includes('periodic')")
         browser.wait(f"{MODEL}('moving line').data.x.length > 2")
@@ -190,6 +198,7 @@ def test_the_links_of_a_mechanism_move(browser):
         browser.wait(f"!{told}.includes('Gap of 0.1 mm')")
         assert browser.value(LINK) == held, "at the same moment"
         check(browser.seen())
+    browser.motion("reduce")
 
 
 def test_a_link_that_says_nonsense_is_answered_in_words(address, browser):
@@ -219,28 +228,31 @@ def test_the_page_stays_alive_while_a_link_is_computed(address, browser):
         asked.close()
 
 
-@pytest.mark.parametrize(("width", "columns"), [(1280, 3), (400, 1)])
-def test_the_page_fits(address, browser, width, columns, tmp_path):
+def test_the_page_fits(address, browser):
     """No scrolling sideways; the machine and two pictures beside each other, or one column; every handle has a name."""
-    browser.visit(address, width=width)
+    browser.visit(address, width=1280)
     browser.wait(f"{HEADLINE}.includes('periodic')")
     browser.wait(deep("all(document, '.noUi-handle').every(node => node.getAttribute('aria-label'))"))
-    whole, shown = browser.seen().width
-    assert whole <= shown <= width
-    places = browser.value(deep("[...new Set(all(document, '.bk-Figure').map(n => Math.round(middle(n)[0] / 20)))]"))
-    assert len(places) == columns, places
     labels = browser.value(deep("all(document, '.noUi-handle').map(node => node.getAttribute('aria-label'))"))
     assert len(set(labels)) == 3
-    browser.picture(tmp_path / f"{width}.png")
+    assert browser.value("Bokeh.documents[0].get_model_by_name('pause').active") is False, "little motion is wanted"
+    for width, columns in ((1280, 3), (400, 1)):
+        browser.resize(width)
+        places = deep("new Set(all(document, '.bk-Figure').map(n => Math.round(middle(n)[0] / 20))).size")
+        browser.wait(f"{places} == {columns}", 10.0)
+        whole, shown = browser.seen().width
+        assert whole <= shown <= width
 
 
 def test_closing_tabs_prints_nothing(tmp_path):
     """Tabs that are closed while the page computes leave the terminal as it was."""
-    with (tmp_path / "err").open("w") as errors, served("impact-beam", stderr=errors) as address:
-        for number in range(3):
-            with Browser(tmp_path / f"profile-{number}") as browser:
-                browser.visit(address, width=1400)
-                browser.value("location.reload()")
+    with (
+        (tmp_path / "err").open("w") as errors,
+        served("impact-beam", stderr=errors) as address,
+        Browser(tmp_path / "profile") as browser,
+    ):
+        browser.visit(address, width=1400)
+        browser.value("location.reload()")
     said = (tmp_path / "err").read_text()
     assert "Traceback" not in said
     assert [line for line in said.splitlines() if "compil" not in line and line not in ("", "Aborted.")] == []

@@ -46,7 +46,7 @@ def peaks_of_scipy(speed, cycles, least=False):
         span = cycle / speed, (cycle + 1) / speed
         run = solve_ivp(motion, span, state, method="DOP853", rtol=1e-9, atol=1e-14, max_step=5e-5, dense_output=True)
         state = run.y[:, -1]
-        found.append((min if least else max)(force(t, run.sol(t)) for t in np.linspace(*span, 20_001)))
+        found.append((min if least else max)(force(t, run.sol(t)) for t in np.linspace(*span, 5_001)))
     return np.array(found)
 
 

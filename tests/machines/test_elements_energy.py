@@ -120,7 +120,7 @@ def worst_gap(folder, seed, cycles=2, hertzian=False, steps=400):
     return worst, int(record.impacts.sum())
 
 
-@pytest.mark.parametrize("seed", [*range(5), 109])
+@pytest.mark.parametrize("seed", [*range(3), 109])
 def test_energy_comes_from_the_loads_alone(tmp_path, seed):
     """In every cycle the work of drives and loads is what dampers and stops take and the change of energy.
 
@@ -132,7 +132,7 @@ def test_energy_comes_from_the_loads_alone(tmp_path, seed):
 @pytest.mark.parametrize("seed", range(1000, 1004))
 def test_energy_of_hertzian_stops(tmp_path, seed):
     """Taylor series keep the balance of a cycle to 1e-7."""
-    assert worst_gap(tmp_path, seed, hertzian=True)[0] < 1.0
+    assert worst_gap(tmp_path, seed, 1, hertzian=True)[0] < 1.0
 
 
 @pytest.mark.slow

@@ -105,7 +105,7 @@ def test_the_reference_does_not_move_with_twice_as_many_modes():
         for beam, least in ((ImpactBeam(), 1e-4), (HARD_BEAM, 1e-5)):
             at = replace(beam, excitation_frequency=frequency, clearance=clearance)
             reference = with_settings(at, {"fidelity": "reference"})
-            _agree(reference, replace(reference, n_modes=40), 100, peaks=least, path=least)
+            _agree(reference, replace(reference, n_modes=40), 30, peaks=least, path=least)
 
 
 @pytest.mark.slow

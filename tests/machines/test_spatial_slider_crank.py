@@ -182,8 +182,8 @@ def test_a_rigid_rod_rattles_in_space_like_the_exact_mechanism():
         slider_clearance=0.1e-3,
     )
     samples = 720
-    instants = np.arange(1, 200) * (machine.cycle_period / samples)
-    history = simulate(machine, 1, samples_per_cycle=samples).history[0, 1:200]
+    instants = np.arange(1, 120) * (machine.cycle_period / samples)
+    history = simulate(machine, 1, samples_per_cycle=samples).history[0, 1:120]
     twin = RigidMechanism(machine, 2).run(instants)
     assert np.abs(twin).max(axis=0) == pytest.approx([machine.slider_clearance] * 2, rel=0.05)
     np.testing.assert_allclose(history[:, 0], twin[:, 0], atol=0.02 * machine.slider_clearance)

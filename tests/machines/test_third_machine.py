@@ -13,6 +13,7 @@ from chaosgym.cli import app
 from chaosgym.envs import TASKS, register_environments
 from chaosgym.errors import ChaosgymError
 from chaosgym.machines import MACHINES, register_machine
+from tests.design.small import small_studies
 from tests.third_machine import ImpactOscillator
 
 NAME = ImpactOscillator.name
@@ -45,11 +46,11 @@ def answer(*arguments: str) -> dict:
 def sweep(tmp_path_factory):
     """A small labelled sweep of the oscillator."""
     folder = tmp_path_factory.mktemp("sweep") / "sweep"
-    axes = ("--axis", "frequency=5:9:9:log", "--axis", "gap=5e-4:1e-3:7:log")
+    axes = ("--axis", "frequency=5:9:9:log", "--axis", "gap=5e-4:1e-3:6:log")
     found = answer(
-        "sweep", NAME, *axes, "--budget", 200, "--label", "signals=1", "--label", "full-types=0.2", "--out", folder
+        "sweep", NAME, *axes, "--budget", 200, "--label", "signals=1", "--label", "full-types=0.1", "--out", folder
     )
-    assert found["points"] == 63
+    assert found["points"] == 54
     return folder
 
 
@@ -101,7 +102,8 @@ def test_design_report(tmp_path):
     brief, text = tmp_path / "brief.toml", run("design", "--template", NAME).stdout
     assert "\nseries = 32 " in text
     brief.write_text(text.replace("\nseries = 32 ", "\nseries = 8 "))
-    found = answer("design", brief, "--verdict-only", "--out", tmp_path / "report.html")
+    with small_studies():
+        found = answer("design", brief, "--verdict-only", "--out", tmp_path / "report.html")
     assert found["machine"]["name"] == NAME if isinstance(found["machine"], dict) else found["machine"] == NAME
     assert NAME in (tmp_path / "report.html").read_text()
 

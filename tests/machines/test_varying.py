@@ -407,6 +407,7 @@ def test_gears_that_stay_in_mesh_do_not_lack_contact(tmp_path):
         "speed=2125Hz:2200Hz:2",
         "--out",
         str(tmp_path / "sweep"),
+        *("--label", "full-types=0"),
     ]
     result = CliRunner().invoke(app, ["sweep", *given], catch_exceptions=False)
     assert "periodic 2" in result.output
