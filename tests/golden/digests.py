@@ -33,7 +33,10 @@ PROCESSORS = {
     "Haswell": NO_AVX512,
     "Prescott": NO_AVX512,
 }
-"""Environment of sets of kernels of OpenBLAS: the newest, that of most processors, the oldest. All have fused multiply-add, as processors since 2013 do."""
+"""Environment of sets of kernels of OpenBLAS: the newest, that of most processors, the oldest.
+
+All have fused multiply-add, as processors since 2013 do.
+"""
 
 FEW = ("impact-beam: periodic", "impact-beam: chaotic", "slider-crank: both joints", "four-bar-akhadkar", "gear")
 """What is compared where not all is."""
