@@ -91,7 +91,7 @@ def test_the_best_felt_speed_is_one_that_was_felt():
             returned += wanted != demand
         observations, *_ = envs.step(speeds[:, None])
     assert returned > 100
-    following, best = (play(one, BEAM, MACHINES, objective="life") for one in (Follow(), BestFelt()))
+    following, best = (play(one, BEAM, range(6), objective="life") for one in (Follow(), BestFelt()))
     assert following.damage.mean() > 1.2 * best.damage.mean()
 
 

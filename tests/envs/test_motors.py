@@ -106,7 +106,7 @@ def test_gymnasium_finds_nothing_to_complain_about(action, motored):
 @pytest.mark.parametrize("disturbed", [{}, {"speed_ripple": 0.002, "kick": 1e-4, "wear": 0.1}])
 def test_side_by_side_gives_the_same_bytes(disturbed, motored):
     """Native and single environments: observations, rewards and infos, ends of jobs included."""
-    keywords = {"machine": motored(), **EASY, "steps": 7, **disturbed}
+    keywords = {"machine": motored(), **EASY, "steps": 5, **disturbed}
     mode = AutoresetMode.NEXT_STEP
     native = gym.make_vec("chaosgym/MachineTolerance-v0", num_envs=2, autoreset_mode=mode, **keywords)
     sync = gym.make_vec(
@@ -116,7 +116,7 @@ def test_side_by_side_gives_the_same_bytes(disturbed, motored):
         vector_kwargs={"autoreset_mode": mode},
         **keywords,
     )
-    assert _assert_same_episodes((native, sync), 17) > 3
+    assert _assert_same_episodes((native, sync), 12) > 3
     again = pickle.loads(pickle.dumps(native.unwrapped.jobs._drive))
     np.testing.assert_array_equal(again._step, native.unwrapped.jobs._drive._step)
 

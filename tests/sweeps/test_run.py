@@ -360,6 +360,15 @@ def test_types_that_take_long_are_left_to_the_user(tmp_path, monkeypatch):
     assert types_by_default.with_affordable_types(plan, tmp_path) == (quick.plan, None)
 
 
+def test_no_type_is_timed_for_a_folder_that_is_refused(tmp_path, monkeypatch):
+    """Whoever names a folder with other things in it is told so at once."""
+    (tmp_path / "note.txt").write_text("mine")
+    monkeypatch.setattr(types_by_default, "full_type", lambda machine, plan: pytest.fail("a type was timed"))
+    plan = SweepPlan(PLAIN_BEAM, (Axis("excitation_frequency", 10.0, 20.0, 30),))
+    with pytest.raises(DatasetError, match="is no run of this sweep"):
+        types_by_default.with_affordable_types(plan, tmp_path)
+
+
 def test_the_told_time_of_types_is_that_of_points_all_over_the_plan(monkeypatch):
     """Points that differ in cost a hundredfold along either axis are met in about their shares."""
     axes = (Axis("excitation_frequency", 18.0, 30.0, 25), Axis("clearance", 0.1e-3, 0.14e-3, 3))
