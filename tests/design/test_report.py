@@ -401,7 +401,9 @@ def test_the_head_of_the_report_says_whose_it_is(answered):
     The brief is quoted as text, and every entry of the contents has its place.
     """
     heading = {"title": "Damper & pump", "project": "P-1042", "author": "A. Person"}
-    headed = replace(answered, brief=brief_from(tomllib.loads(CALM) | {"report": heading}))
+    search = answered.improvement
+    many = replace(search, suggestions=2 * search.suggestions)  # of more than three changes there is a table
+    headed = replace(answered, brief=brief_from(tomllib.loads(CALM) | {"report": heading}), improvement=many)
     page = design_report(headed, date="2026-01-02", brief=CALM + "# <b>")
     assert "Damper &amp; pump · P-1042 · A. Person · 2026-01-02" in page
     assert "<title>Does not meet its criteria: Damper &amp; pump</title>" in page
