@@ -30,7 +30,7 @@ from chaosgym.simulation import simulate
 from tests.diagnosis.oscillators import RigidImpact
 from tests.plain_modes import HARD_BEAM
 
-MACHINES = int(os.environ.get("CHAOSGYM_BRANCHES", "40"))
+MACHINES = int(os.environ.get("CHAOSGYM_BRANCHES", "100"))
 """Random machines whose branches are followed."""
 
 
