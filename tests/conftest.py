@@ -23,6 +23,11 @@ LONG = (
     "tests/diagnosis/test_attractors.py",
     "tests/diagnosis/test_whole_box.py",
     "tests/branches/test_branch.py",
+    "tests/recordings/test_judge.py",
+    "tests/recordings/test_noisy_machines.py",
+    "tests/design/test_report.py",
+    "tests/fit/test_model_fit.py",
+    "tests/series/test_slips.py",
 )
 """Files of minutes. They begin first, so that a run does not end with one of them on one processor."""
 

@@ -10,7 +10,7 @@ import pytest
 from tests.recordings import noisy_machines
 from tests.recordings.test_judge import judged, share, show
 
-RECORDS = 36
+RECORDS = 18
 """Of each kind."""
 
 
@@ -21,7 +21,7 @@ def test_noisy_beams_are_not_judged_wrongly():
 
 @pytest.mark.slow
 def test_noisy_machines_are_hardly_ever_judged_wrongly():
-    """108 records: no nature is told wrongly without a condition, and at most 1 % under that of a random scatter."""
+    """54 records: no nature is told wrongly without a condition, and at most 1 % under that of a random scatter."""
     counts, wrong = judged(noisy_machines, noisy_machines.KINDS, range(RECORDS))
     show(counts)
     assert share(counts, "all", "wrong") == 0.0, wrong
