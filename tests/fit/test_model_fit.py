@@ -140,11 +140,13 @@ def test_a_gap_that_was_stated_wrongly_is_found(beam):
 
 @pytest.mark.slow
 @pytest.mark.parametrize(("frequency", "nature"), [(11.5, "periodic"), (7.6, "chaotic")])
-def test_records_of_another_integrator_with_noise_on_the_force(frequency, nature):
+def test_records_of_another_integrator_with_noise_on_the_force(frequency, nature, monkeypatch):
     """The oscillator by SciPy, off its nominal numbers, 0.5 % of noise on each cycle's force: most of the posterior.
 
     Some machines within the tolerances of the chaotic one are periodic, so its nature is told, or left open.
     """
+    for name, value in (("FIRST", 60), ("LATER", 20)):
+        monkeypatch.setattr(f"chaosgym.fit.model_fit.{name}", value)
     nominal = ImpactOscillator(frequency=frequency)
     true = ImpactOscillator(frequency=1.01 * frequency, gap=1.03e-3, damping=1.9)
     assert diagnose_alone(true, budget=800).nature == nature
