@@ -49,7 +49,7 @@ LEARNED = (
 )
 """Sweep from which the classifier learns; made once, beside the folders of the runs."""
 BRIEF = """machine = "impact-beam"
-series = 4
+series = 8
 [parameters]
 excitation_frequency = "8 Hz"
 [tolerances]

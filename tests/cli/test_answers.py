@@ -24,7 +24,7 @@ PEAKS = f'{DOCS}/data/peaks.csv --column upper --sensor-error "1 N"'
 CRANK = f"{DOCS}/machines/compressor.toml"
 MAP = "sweep impact-beam --axis excitation_frequency=4:26:2 --axis clearance=0.12mm:0.13mm:2 --budget 100 --workers 1"
 BRIEF = """machine = "impact-beam"
-series = 4
+series = 8
 [parameters]
 excitation_frequency = "8 Hz"
 [tolerances]
