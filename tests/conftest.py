@@ -28,6 +28,7 @@ LONG = (
     "tests/design/test_report.py",
     "tests/fit/test_model_fit.py",
     "tests/series/test_slips.py",
+    "tests/sweeps/test_cluster.py",
 )
 """Files of minutes. They begin first, so that a run does not end with one of them on one processor."""
 

@@ -27,12 +27,12 @@ def written(name: str, text: str, output: str) -> str:
     return text.replace(f"{head}{shown(name, text)}```", f"{head}{output}```")
 
 
-def run(name: str, place: Path) -> str:
+def run(name: str, place: Path, options: str = "") -> str:
     """Run an example in an empty folder, and return what it prints."""
     (place / "docs").mkdir()
     for source in ("docs/machines", "docs/examples"):
         (place / source).symlink_to(ROOT / source)
-    return _run(COMMAND.format(name=name), place)
+    return _run(f"{COMMAND.format(name=name)}{options}", place)
 
 
 def main(page: Path, names: list[str]) -> None:
