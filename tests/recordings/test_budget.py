@@ -1,6 +1,7 @@
 """A small file must not take the computer: readings are counted before they are read, and patterns are linear."""
 
 import io
+import math
 import re
 import struct
 import subprocess
@@ -286,7 +287,12 @@ def seconds(work):
 
 def proportional(read, count, what):
     """Whether twice as many letters take less than three times as long; a busy computer may ask for another look."""
-    return any(read(2 * count, what) < 3.0 * read(count, what) + 0.01 for _ in range(15))
+    few = many = math.inf
+    for _ in range(15):
+        few, many = min(few, read(count, what)), min(many, read(2 * count, what))
+        if many < 3.0 * few + 0.01:
+            return True
+    return False
 
 
 def answer(read, *values, **named):
