@@ -14,7 +14,7 @@ from tests.plain_modes import PLAIN_BEAM
 from thesis.scorecard import search as calibration
 from thesis.scorecard.calibrate import calibrate
 from thesis.scorecard.findings import Finding
-from thesis.scorecard.objective import WITHOUT_A_SLOPE, Stages, cost, objective, searched_statements
+from thesis.scorecard.objective import WITHOUT_A_SLOPE, Objective, Stages, cost, objective, searched_statements
 from thesis.scorecard.quantities import clearance_unit
 from thesis.scorecard.search import Budget
 from thesis.scorecard.search_space import (
@@ -144,7 +144,7 @@ TOY = SearchSpace(
 STAGES = Stages((), (COMPARED["IBS-013"],), (COMPARED["IBS-020"],), ())
 
 
-def bowl(machine, stages, unprinted, *, workers=None):
+def bowl(aim, machine, unprinted, *, workers=None):
     """Costs that depend on the width alone, least at 20 mm, in two stages; one of the families is worse."""
     value = min(1.0, abs(machine.width - 20e-3) / 10e-3 + 0.3 * (machine.damping_family == "uniform"))
     yield {"IBS-013": value}
@@ -154,12 +154,14 @@ def bowl(machine, stages, unprinted, *, workers=None):
 @pytest.fixture
 def toy(monkeypatch):
     """The search with a known answer instead of simulations."""
-    monkeypatch.setattr(calibration, "staged_costs", bowl)
+    monkeypatch.setattr(Objective, "staged_costs", bowl)
 
     def search(folder, candidates, seed=0, draws=0):
         found = calibration.open_journal(folder, {"seed": seed, "statements": list(STAGES.ids), "draws": draws})
         journal = folder / calibration.JOURNAL_FILE
-        calibration.search(found, TOY, STAGES, Budget(candidates=candidates), seed, journal, 1, False, draws=draws)
+        calibration.search(
+            found, TOY, Objective(STAGES), Budget(candidates=candidates), seed, journal, 1, False, draws=draws
+        )
         return found
 
     return search
@@ -190,6 +192,29 @@ def test_a_search_is_a_funnel(toy, tmp_path):
         assert abs(basin.values(best.shares)["width"] - 20e-3) < min(1e-3, abs(basin.start["width"] - 20e-3))
     toy(tmp_path / "parts", 150, draws=100)
     assert toy(tmp_path / "parts", 320, draws=100) == whole
+
+
+def test_what_neighbours_hit_costs_nothing(monkeypatch):
+    """The frequency at 284.0 mm follows Young's modulus, which a neighbour has up to 1 % off: half of one per cent of
+    tolerance is hit by some neighbours alone, two per cent by all, none by none; the machine itself does not count."""
+    frequency, costs = COMPARED["IBS-034"], {}
+    for tolerance in (1e-6, 2e-3, 2e-2):
+        asked = replace(frequency, tolerance=frequency.tolerance._replace(relative=tolerance))
+        aim = Objective(Stages((), (asked,), (), ()), neighbours=6)
+        (found,) = aim.staged_costs(PLAIN_BEAM, {}, workers=1)
+        costs[tolerance] = found["IBS-034"]
+    assert costs[2e-2] == 0.0 < costs[2e-3] < 0.8 < costs[1e-6]
+
+
+def test_statements_of_one_figure_share_its_weight():
+    """Three forces of figure 3.8a weigh as much as one nature of figure 3.6; each statement counts alone without
+    neighbours. What was not run counts as missed."""
+    stages = Stages((), tuple(COMPARED[name] for name in ("IBS-013", "IBS-024", "IBS-025", "IBS-026")), (), ())
+    assert Objective(stages, 2).value(
+        {"IBS-013": 0.0, "IBS-024": 1.0, "IBS-025": 1.0, "IBS-026": 1.0}
+    ) == pytest.approx(0.5)
+    assert Objective(stages, 2).value({"IBS-013": 0.0}) == pytest.approx(0.5)
+    assert Objective(stages).value({"IBS-013": 0.0}) == 0.75
 
 
 def test_a_screen_costs_few_runs():

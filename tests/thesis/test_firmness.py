@@ -10,7 +10,8 @@ from chaosgym.machines.parameters import parameters_of
 from tests.plain_modes import PLAIN_BEAM
 from thesis.scorecard import firmness
 from thesis.scorecard.findings import Finding
-from thesis.scorecard.firmness import Firmness, exclusive_pairs, judge_neighbours, left_out_hits, nudged, shifted
+from thesis.scorecard.firmness import Firmness, exclusive_pairs, judge_neighbours, left_out_hits
+from thesis.scorecard.neighbours import nudged, shifted
 from thesis.scorecard.scorecard import Scorecard
 from thesis.scorecard.verdicts import judge
 from thesis.statements import read_comparisons

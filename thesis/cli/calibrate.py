@@ -29,6 +29,13 @@ UNFINISHED = 3
     show_default=True,
     help="Candidates drawn over all ranges of each structure, and judged by few runs; the best is where it begins.",
 )
+@click.option(
+    "--neighbours",
+    type=click.IntRange(0, 1000),
+    default=0,
+    show_default=True,
+    help="Follow the hits to be expected of so many neighbours of a candidate, not those of itself.",
+)
 @click.option("--seed", type=click.IntRange(0), default=0, show_default=True)
 @WORKERS
 @AS_JSON
@@ -39,6 +46,7 @@ def calibrate(
     leave_out: tuple[str, ...],
     basin: str | None,
     draws: int,
+    neighbours: int,
     seed: int,
     workers: int | None,
     as_json: bool,
@@ -55,6 +63,7 @@ def calibrate(
         left_out=frozenset(leave_out),
         basin=basin,
         draws=draws,
+        neighbours=neighbours,
         workers=workers,
         progress=True,
     )

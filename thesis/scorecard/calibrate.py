@@ -21,7 +21,7 @@ from chaosgym.machines.parameters import parameters_of
 from chaosgym.version import __version__
 from thesis.cache import default_folder
 from thesis.scorecard.evaluation import evaluate
-from thesis.scorecard.objective import searched_statements, statements_of
+from thesis.scorecard.objective import Objective, searched_statements, statements_of
 from thesis.scorecard.observation import THOROUGH
 from thesis.scorecard.scorecard import Scorecard
 from thesis.scorecard.search import JOURNAL_FILE, WIDE, WIDTH, Budget, Candidate, open_journal, search
@@ -125,6 +125,7 @@ def calibrate(
     left_out: frozenset[str] = frozenset(),
     basin: str | None = None,
     draws: int = 0,
+    neighbours: int = 0,
     workers: int | None = None,
     cache: Path | None = None,
     progress: bool = False,
@@ -148,6 +149,8 @@ def calibrate(
         Beginning of the names of the structures that are searched; all by default.
     draws
         Beams or cranks drawn over the whole ranges of each structure, of which the best is where its search begins.
+    neighbours
+        Follow the hits that are to be expected of so many neighbours of a candidate; 0 follows the candidate itself.
     workers
         Number of threads; all processors by default.
     cache
@@ -173,9 +176,11 @@ def calibrate(
         raise ParameterError(f"no statement that is searched on is about figure {min(unknown)}; known: {known}")
     stages = stages.without(frozenset(one.id for stage in stages for one in stage if one.statement.figure in left_out))
     plan = {"machine": name, "seed": seed, "version": __version__, "statements": list(stages.ids), "draws": draws}
+    plan["neighbours"] = neighbours
     found = open_journal(folder, {**plan, "basins": [one.name for one in space.basins]})
     width = WIDE if left_out else WIDTH
-    search(found, space, stages, budget, seed, folder / JOURNAL_FILE, workers, progress, width=width, draws=draws)
+    aim = Objective(stages, neighbours)
+    search(found, space, aim, budget, seed, folder / JOURNAL_FILE, workers, progress, width=width, draws=draws)
     result = _judged(space, found, left_out, cache or default_folder(), workers, progress)
     text = json.dumps(result.as_dict(), indent=2, allow_nan=False) + "\n"
     write_atomically(folder / RESULT_FILE, lambda temporary: temporary.write_text(text))

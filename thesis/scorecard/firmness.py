@@ -1,16 +1,13 @@
 """How firm each verdict is: the share of neighbours that hit, statements that exclude each other, and figures left out.
 
-A neighbour is the machine with every fitted or assumed constant up to 1 % off, run at speeds up to half a step of the
-printed grid off, from another initial state. A statement that at least half of the neighbours hit is a firm hit; one
-that few hit is luck.
-Neighbours are judged by hasty runs. The numbers are kept in ``firmness.json``, which names the machine they hold for:
-``python -m thesis firmness`` writes it anew.
+A statement that at least half of the ``neighbours`` hit is a firm hit; one that few hit is luck. The numbers are kept
+in ``firmness.json``, which names the machine they hold for: ``python -m thesis firmness`` writes it anew.
 """
 
 import hashlib
 import json
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from functools import cache
 from pathlib import Path
 from typing import Any
@@ -19,23 +16,14 @@ import numpy as np
 from scipy.stats import t as student
 from tqdm import tqdm
 
-from chaosgym.errors import DatasetError, ParameterError
+from chaosgym.errors import DatasetError
 from chaosgym.files import write_atomically
 from chaosgym.machines import Machine
 from chaosgym.machines.parameters import parameters_of
-from thesis.scorecard.evaluation import evaluate
-from thesis.scorecard.objective import HASTENED, statements_of
-from thesis.scorecard.observation import QUICK
-from thesis.statements import Comparison
-from thesis.statements.comparisons import Axis
+from thesis.scorecard.neighbours import neighbour_of
+from thesis.scorecard.objective import statements_of
 
 KEPT = Path(__file__).with_name("firmness.json")
-
-NUDGE = 0.01
-"""Largest relative change of a constant."""
-
-GRID = {"impact-beam": 1.0, "slider-crank": 10.0}
-"""Steps of the thesis' sweeps over the speed [Hz, rpm] (3.5.1, 4.5.1)."""
 
 FIRM = 0.5
 """Share of the neighbours that hit a firm hit, at least."""
@@ -145,46 +133,12 @@ def judge_neighbours(
         Show a progress bar on standard error.
     """
     asked = statements_of(machine.name, joint)
-    effort = QUICK[machine.name]
     hit = np.zeros((count, len(asked)), dtype=bool)
     for k in tqdm(range(count), desc="neighbours", disable=not progress, unit="machine"):
-        rng = np.random.default_rng((seed, k))
-        nearby = nudged(machine, rng)
-        shift = float(rng.uniform(-0.5, 0.5)) * GRID[machine.name]
-        moved = [shifted(one, machine.speed_field, shift) for one in asked]
-        efforts = {machine.name: effort._replace(start=1 + k)}
-        judged = evaluate(moved, {machine.name: nearby}, efforts=efforts, folder=folder, workers=workers)
+        judged = neighbour_of(machine, k, seed).judge(asked, folder=folder, workers=workers)
         hit[k] = [one.verdict == "hit" for one in judged]
     shares = dict(zip((one.id for one in asked), hit.mean(axis=0).tolist(), strict=True))
     return Firmness(shares, tuple(hit.sum(axis=1).tolist()))
-
-
-def nudged(machine: Machine, rng: np.random.Generator) -> Machine:
-    """The machine with every constant that is not in print up to 1 % off."""
-    described = parameters_of(machine)
-    while True:
-        factors = {
-            name: getattr(machine, name) * (1.0 + NUDGE * rng.uniform(-1.0, 1.0))
-            for name, about in described.items()
-            if about.provenance in ("calibrated", "assumed") and isinstance(getattr(machine, name), float)
-        }
-        factors.pop("matrix_update_interval", None)
-        try:
-            return replace(machine, **factors, **HASTENED.get(machine.name, {}))
-        except ParameterError:  # an inertia just below what its offset mass requires
-            continue
-
-
-def shifted(one: Comparison, field: str, shift: float) -> Comparison:
-    """The statement at speeds that are shifted, where it has any."""
-    at = tuple({**here, field: here[field] + shift} if field in here else here for here in one.at)
-    return replace(one, at=at, along=_moved(one.along, field, shift), across=_moved(one.across, field, shift))
-
-
-def _moved(axis: Axis | None, field: str, shift: float) -> Axis | None:
-    if axis is None or axis.field != field:
-        return axis
-    return axis._replace(low=axis.low + shift, high=axis.high + shift)
 
 
 def exclusive_pairs(costs: Sequence[Mapping[str, float]]) -> tuple[tuple[str, str], ...]:

@@ -10,6 +10,7 @@ it is printed.
 """
 
 import math
+from collections import Counter
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import replace
 from typing import Any, NamedTuple
@@ -20,6 +21,7 @@ from chaosgym.machines import Machine
 from chaosgym.machines.parameters import with_settings
 from thesis.scorecard.evaluation import evaluate
 from thesis.scorecard.findings import Finding
+from thesis.scorecard.neighbours import HASTENED, neighbour_of
 from thesis.scorecard.observation import QUICK
 from thesis.scorecard.verdicts import Judged, error_of
 from thesis.statements import Comparison, read_comparisons
@@ -48,9 +50,6 @@ BEYOND = 2.0
 
 FULL_CURVES = frozenset(("smooth_end", "chaos_begin", "periodic_end", "chaos_run", "chaos_present"))
 """Quantities whose whole curve decides; many of them share one."""
-
-HASTENED: Mapping[str, Mapping[str, Any]] = {"slider-crank": {"matrix_update_interval": 5.0}}
-"""Fields by which quick runs differ from thorough ones, by machine: the thesis itself updates every 5 deg (5.2.2)."""
 
 
 class Stages(NamedTuple):
@@ -131,11 +130,44 @@ def objective(judged: Sequence[Judged]) -> float:
     return float(np.mean([cost(one) for one in judged]))
 
 
-def staged_costs(
-    machine: Machine, stages: Stages, unprinted: Mapping[str, float], *, workers: int | None = None
-) -> Iterator[dict[str, float]]:
-    """Costs of the statements of one stage after the other, by quick runs."""
-    machine = with_settings(machine, HASTENED.get(machine.name, {}))
-    for stage in filter(None, stages):
-        judged = evaluate(stage, {machine.name: machine}, efforts=QUICK, workers=workers, unprinted=unprinted)
-        yield {one.comparison.id: cost(one) for one in judged}
+class Objective(NamedTuple):
+    """What a search makes small: the mean cost of its statements, in stages.
+
+    With ``neighbours``, so many of them are judged instead of the machine itself. A statement that one hits costs
+    nothing there, and statements about one figure share the weight of one, so that a lucky point wins nothing: the
+    objective follows the misses that are to be expected.
+    """
+
+    stages: Stages
+    neighbours: int = 0
+
+    @property
+    def weights(self) -> Mapping[str, float]:
+        """Weight of each statement."""
+        asked = [one for stage in self.stages for one in stage]
+        if not self.neighbours:
+            return {one.id: 1.0 for one in asked}
+        figures = Counter(one.statement.figure or one.id for one in asked)
+        return {one.id: 1.0 / figures[one.statement.figure or one.id] for one in asked}
+
+    def value(self, costs: Mapping[str, float]) -> float:
+        """The objective, 0 to 1, by the costs of statements; one that was not run counts as wholly missed."""
+        weights = self.weights
+        return sum(weight * costs.get(name, 1.0) for name, weight in weights.items()) / sum(weights.values())
+
+    def staged_costs(
+        self, machine: Machine, unprinted: Mapping[str, float], *, workers: int | None = None
+    ) -> Iterator[dict[str, float]]:
+        """Costs of the statements of one stage after the other, by quick runs."""
+        nearby = [neighbour_of(machine, k) for k in range(self.neighbours)]
+        hasty = with_settings(machine, HASTENED.get(machine.name, {}))
+        for stage in filter(None, self.stages):
+            if not nearby:
+                judged = evaluate(stage, {hasty.name: hasty}, efforts=QUICK, workers=workers, unprinted=unprinted)
+                yield {one.comparison.id: cost(one) for one in judged}
+                continue
+            shares = [one.judge(stage, workers=workers, unprinted=unprinted) for one in nearby]
+            yield {
+                same[0].comparison.id: float(np.mean([0.0 if one.verdict == "hit" else cost(one) for one in same]))
+                for same in zip(*shares, strict=True)
+            }

@@ -24,7 +24,7 @@ from tqdm import tqdm
 
 from chaosgym.errors import ChaosgymError, DatasetError, ParameterError
 from chaosgym.files import is_empty, write_atomically
-from thesis.scorecard.objective import Stages, staged_costs
+from thesis.scorecard.objective import Objective
 from thesis.scorecard.search_space import Basin, SearchSpace
 
 PLAN_FILE, JOURNAL_FILE = "plan.json", "journal.jsonl"
@@ -138,9 +138,9 @@ class _Trials:
     """Candidates tried one after the other, those of an earlier call first; kept in ``found`` and a journal."""
 
     def __init__(
-        self, found: list[Candidate], space: SearchSpace, stages: Stages, budget: Budget, journal: Path
+        self, found: list[Candidate], space: SearchSpace, aim: Objective, budget: Budget, journal: Path
     ) -> None:
-        self.found, self._space, self._stages, self._budget, self._journal = found, space, stages, budget, journal
+        self.found, self._space, self._aim, self._budget, self._journal = found, space, aim, budget, journal
         self._replayed, self._began = list(found), time.monotonic()
         found.clear()
 
@@ -163,7 +163,7 @@ class _Trials:
             drawn = generation == DRAWN
             recent = [each for each in self.found if each.basin == k and (each.generation == DRAWN) == drawn]
             recent = recent[-(COMPARED if drawn else 20) :]
-            value, costs = _tried(self._space, self._space.basins[k], shares, self._stages, recent, go_on, workers)
+            value, costs = _tried(self._space, self._space.basins[k], shares, self._aim, recent, go_on, workers)
             one = Candidate(k, generation, tuple(float(share) for share in shares), value, costs)
             with self._journal.open("a") as file:
                 file.write(json.dumps(one) + "\n")
@@ -179,7 +179,7 @@ class _Trials:
 def search(
     found: list[Candidate],
     space: SearchSpace,
-    stages: Stages,
+    aim: Objective,
     budget: Budget,
     seed: int,
     journal: Path,
@@ -194,8 +194,8 @@ def search(
     ``width`` is the standard deviation of the first generation, as a share of the ranges; so many ``draws`` over the
     ranges of every basin come before it.
     """
-    trials = _Trials(found, space, stages, budget, journal)
-    everyone = 1.0 if stages.screen else HALF  # of an evolution, what screens the draws rules out none
+    trials = _Trials(found, space, aim, budget, journal)
+    everyone = 1.0 if aim.stages.screen else HALF  # of an evolution, what screens the draws rules out none
     total = float(budget.candidates or budget.minutes or 0.0)
     with tqdm(
         total=total, desc="calibrate", disable=not progress, unit="candidate" if budget.candidates else "min"
@@ -276,7 +276,7 @@ def _tried(
     space: SearchSpace,
     basin: Basin,
     shares: Sequence[float],
-    stages: Stages,
+    aim: Objective,
     recent: Sequence[Candidate],
     go_on: float,
     workers: int | None,
@@ -285,18 +285,23 @@ def _tried(
 
     After the first stage a share ``go_on`` is kept, after the others a half.
     """
-    count, costs = len(stages.ids), dict[str, float]()
+    costs, weights = dict[str, float](), aim.weights
     try:
         machine = space.machine(basin, shares)
-        for part in staged_costs(machine, stages, space.conditions(basin, shares), workers=workers):
+        for part in aim.staged_costs(machine, space.conditions(basin, shares), workers=workers):
             costs.update(part)
-            others = [sum(one.costs[name] for name in costs) for one in recent if costs.keys() <= one.costs.keys()]
-            if len(others) >= 5 and sum(costs.values()) > float(np.quantile(others, go_on)):
+            others = [
+                sum(weights[name] * one.costs[name] for name in costs)
+                for one in recent
+                if costs.keys() <= one.costs.keys()
+            ]
+            here = sum(weights[name] * value for name, value in costs.items())
+            if len(others) >= 5 and here > float(np.quantile(others, go_on)):
                 break
             go_on = HALF
     except ParameterError:
         return 1.0, {}
-    return (sum(costs.values()) + count - len(costs)) / count, costs
+    return aim.value(costs), costs
 
 
 def complete_costs(folder: Path) -> list[Mapping[str, float]]:
