@@ -111,7 +111,7 @@ def _largest(sensor_peak: Any) -> list[float]:
 @plot_option()
 def show(machine: Any, markdown: bool, plot: str | None, as_json: bool) -> None:
     """Print every parameter of a machine, where the number comes from, and what follows; --plot draws it."""
-    from chaosgym.machines.parameters import markdown_table, origin_of, parameters_of
+    from chaosgym.machines.parameters import digits, markdown_table, origin_of, parameters_of
 
     picture = picture_path(plot, f"show-{machine.name}")
 
@@ -146,7 +146,7 @@ def show(machine: Any, markdown: bool, plot: str | None, as_json: bool) -> None:
         rows = []
         for name, about in described.items():
             value = getattr(machine, name)
-            shown = value if isinstance(value, str) else f"{value:.6g}"
+            shown = value if isinstance(value, str) else digits(value)
             unit = "" if about.unit == "-" else about.unit
             origin = provenance[name]
             rows.append(f"{name:30s} {shown:>11s} {unit:8s} {origin['grade']:10s} {origin['source']}")

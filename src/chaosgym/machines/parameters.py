@@ -22,6 +22,9 @@ Provenance = Literal["printed", "derived", "calibrated", "assumed", "stated"]
 """printed: in the thesis; derived: follows from printed numbers; calibrated: fitted to printed results; assumed;
 stated: in the machine's own file."""
 
+LONG = 1e10
+"""Numbers from here on are shown by powers of ten: stiffnesses stay below, moduli lie above."""
+
 M = TypeVar("M")
 
 
@@ -199,6 +202,18 @@ def origin_of(machine: Any, name: str) -> tuple[str, str]:
     return "given", "this command"
 
 
+def digits(value: float) -> str:
+    """Six digits of a number, for people: with a power of ten only above ten thousand millions and below 0.0001.
+
+    Examples
+    --------
+    >>> digits(1e6), digits(1.5e7), digits(2e-4), digits(2e11)
+    ('1,000,000', '15,000,000', '0.0002', '2e+11')
+    """
+    text = f"{value:,.6g}"
+    return f"{float(text):,.0f}" if "e+" in text and abs(value) < LONG else text
+
+
 def quantity_of(owner: Any, name: str) -> str:
     """Value of a field with its unit, for people: millimetres and gigapascals where these are usual."""
     value, unit = getattr(owner, name), parameters_of(owner)[name].unit
@@ -210,7 +225,7 @@ def quantity_of(owner: Any, name: str) -> str:
         value, unit = 1e-9 * value, "GPa"
     elif unit == "Mcycles":
         unit = "million cycles"
-    return f"{value:,.6g}" + ("" if unit == "-" else f" {unit}")
+    return digits(value) + ("" if unit == "-" else f" {unit}")
 
 
 def is_half_play(machine: Any, name: str) -> bool:
@@ -231,7 +246,7 @@ def markdown_table(machine: Any) -> list[str]:
     rows = ["| parameter | value | unit | provenance | source |", "|---|---|---|---|---|"]
     for name, about in parameters_of(machine).items():
         value = getattr(machine, name)
-        shown = value if isinstance(value, str) else f"{value:.6g}"
+        shown = value if isinstance(value, str) else digits(value)
         unit = "" if about.unit == "-" else about.unit
         rows.append(f"| `{name}` | {shown} | {unit} | {' | '.join(origin_of(machine, name))} |")
     return rows

@@ -3,6 +3,7 @@
 Figures are as wide as a column of a journal takes at 80 % (4.4 in), so that their letters stay above 7 points there.
 """
 
+import re
 from collections.abc import Callable, Sequence
 from functools import partial, wraps
 from textwrap import wrap
@@ -21,6 +22,7 @@ from chaosgym.design.measured import MeasuredPeaks
 from chaosgym.diagnosis.verdict import MachineDiagnosis
 from chaosgym.fit.overlay import Overlay
 from chaosgym.machines import Machine
+from chaosgym.machines.picture import frame
 from chaosgym.plotting import response
 from chaosgym.plotting.branches import bifurcation_map, branches, shares
 from chaosgym.plotting.design import cost_against_life, peak_record, series_life, type_map_around
@@ -55,8 +57,8 @@ LETTERS = 11.7
 
 
 def _titled(figure: Figure, text: str) -> None:
-    """Write a title; lines that are longer than the figure is wide are broken."""
-    width = int(LETTERS * figure.get_figwidth())
+    """Write a title; lines longer than the figure is wide are broken, but not between a number and its unit."""
+    width, text = int(LETTERS * figure.get_figwidth()), re.sub(r"(?<=\d) (?=(Hz|rpm)\b)", "\N{NO-BREAK SPACE}", text)
     figure.suptitle("\n".join(part for line in text.split("\n") for part in wrap(line, width)), **TITLE)
 
 
@@ -103,7 +105,12 @@ def machine_figure(machine: Machine) -> Figure:
         _titled(figure, f"{point_of(machine)}\nCrank angles; rings: joints with clearance")
         return figure
     figure.clear()
-    draw_machine(machine, figure.subplots())
+    panel = figure.subplots()
+    draw_machine(machine, panel)
+    (left, right), (low, high) = panel.dataLim.intervalx, panel.get_ylim()
+    if (right - left) / (high - low) * figure.get_figheight() < WIDTH:
+        figure.set_figwidth(WIDTH)
+        frame(panel, np.array([left, low]), np.array([right, high]))
     _titled(figure, point_of(machine))
     return figure
 

@@ -63,7 +63,7 @@ def sketch_of_joints(record: Any, rows: NDArray[np.int64]) -> Sketch:
             )
         )
     low, high = np.array([-0.6, LOW]), np.array([APART * (len(gaps) - 1) + 0.6, HIGH])
-    return Sketch("What moves in each gap, not where it is; numbers: largest forces", low, high, shapes, words)
+    return Sketch("Gaps, not to scale; numbers: largest forces", low, high, shapes, words)
 
 
 def _gaps(record: Any) -> list[_Gap]:
