@@ -250,6 +250,7 @@ SIMULATE = ("simulate", "impact-beam")
         ((*SIMULATE, "--frequncy-hz", "3"), "simulate has no option --frequncy-hz; did you mean --frequency-hz?"),
         (("design", __file__), "is no brief, which is a TOML file; a recording is judged by `chaosgym judge"),
         (("design", "--template", "impact-beam", "--frequncy-hz", "3"), "allowed: --template, --beside"),
+        (("new-machine", "part.toml"), "part.toml is no template; use --out part.toml for the file to write"),
         (("new-machine", "--out", "nowhere/own.toml"), "nowhere is no folder; make it first"),
         (("simulate", "steam-engine"), "'steam-engine' is not"),
         (("classify", "impact-beam", "--model", "nowhere.npz"), "'nowhere.npz' does not exist"),

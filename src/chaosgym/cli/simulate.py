@@ -174,6 +174,8 @@ def new_machine(kind: str, out: Path | None, schema: bool, as_json: bool) -> Non
     from chaosgym.files import write_atomically
     from chaosgym.machines.machine_file import schema_text, template
 
+    if kind.endswith(".toml") and out is None:
+        raise click.UsageError(f"{kind} is no template; use --out {kind} for the file to write")
     text = schema_text() if schema else template(kind)
     if out is not None:
         if out.exists():
