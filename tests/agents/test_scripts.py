@@ -16,6 +16,7 @@ import chaosgym
 from chaosgym.control.comparison import read_comparison
 from chaosgym.control.policies import load_policy
 from chaosgym.control.rollout import play
+from chaosgym.envs import SB3VecEnv
 from chaosgym.envs.sense import STATISTICS, load_sense
 
 AGENTS = Path(__file__).parent.parent.parent / "agents"
@@ -179,6 +180,27 @@ def test_a_constraint_is_the_budget_of_the_task(tmp_path, monkeypatch):
         with pytest.raises(InterruptedError):
             constrained_ppo.train(constrained_ppo.arguments())
     assert limits == [gym.make(BEAM).unwrapped.task.cost_budget, 0.2]
+
+
+def test_the_jobs_of_a_machine_are_one_episode(monkeypatch):
+    """Only the third of three jobs ends an episode; the first observation of each other job follows within it."""
+    monkeypatch.syspath_prepend(str(AGENTS))
+    from recurrent_ppo import JobsInOne
+
+    given = {"jobs": 3, "steps": 4, "level": "fleet", "split": "train"}
+    plain, joined = SB3VecEnv(BEAM, 2, **given), JobsInOne(SB3VecEnv(BEAM, 2, **given), 3)
+    for envs in (plain, joined):
+        envs.seed(5)
+        envs.reset()
+    clearances = []
+    for step in range(1, 25):
+        (expected, _, ended, _), (seen, _, last, infos) = (envs.step(np.zeros(2, int)) for envs in (plain, joined))
+        np.testing.assert_array_equal(seen, expected)
+        assert (ended == (step % 4 == 0)).all()
+        assert (last == (step % 12 == 0)).all()
+        assert [("terminal_observation" in info) for info in infos] == last.tolist()
+        clearances.append(infos[0]["clearance"])
+    assert len(set(clearances[::4])) == 2, "a machine for each three jobs, as new in each"
 
 
 def test_what_an_export_needs_is_named(tmp_path):
