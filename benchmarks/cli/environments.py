@@ -101,13 +101,14 @@ def risk(machines: int, as_json: bool) -> None:
 @click.option("--machines", type=click.IntRange(2, 192), default=24, show_default=True)
 @click.option("--jobs", type=click.IntRange(2, 100), default=4, show_default=True, help="Of each machine.")
 @click.option("--kept", type=click.Path(dir_okay=False, path_type=Path), default=None, help="File of the returns.")
+@click.option("--policy", type=click.Path(exists=True, path_type=Path), default=None, help="Folder; default: the map.")
 @AS_JSON
-def job_memory(machines: int, jobs: int, kept: Path | None, as_json: bool) -> None:
+def job_memory(machines: int, jobs: int, kept: Path | None, policy: Path | None, as_json: bool) -> None:
     """Let the map of the beams' fleet do several jobs on each machine, forgetting and remembering the earlier ones."""
     from benchmarks.envs.job_memory import job_memory as run
     from benchmarks.envs.job_memory import lines
 
-    found = run(machines, jobs, kept)
+    found = run(machines, jobs, kept, policy)
     emit({"rows": found}, as_json, lambda: lines(found))
 
 
