@@ -205,6 +205,9 @@ def load_checkpoint(folder: Path, kind: Any, envs: Any) -> tuple[Any, Any] | Non
             "anything, so it is not read: choose another folder to start anew"
         )
     state = pickle.loads(signed[SIZE:])
+    before = state["envs"][0].get("num_envs")
+    if before is not None and before != envs.num_envs:
+        raise ModelFileError(f"{folder} was trained on {before} machines side by side; give --envs {before}")
     try:
         model = kind.load(io.BytesIO(state["model"]), envs, device="cpu", force_reset=False)
     except ValueError:  # of stable-baselines3, where spaces differ
