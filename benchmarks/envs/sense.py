@@ -63,7 +63,7 @@ class Held(NamedTuple):
     @property
     def step(self) -> int:
         """Cycles of a step."""
-        return LOOKED // self.share.shape[2]
+        return LOOKED // int(self.share.shape[2])
 
 
 def looks(step: int) -> tuple[int, int, int]:
@@ -76,7 +76,8 @@ def held(machines: int, speeds: int, seed: int, split: str = "train", env: str =
     envs = native_envs(env, 1, level="fleet", split=split)
     task, variants, generator = envs.task, envs.settings.variants, np.random.default_rng(seed)
     batch: Any = variants.batch(machines)
-    every, judge = np.arange(machines), type(envs.jobs.judge)(machines)
+    kind: Any = type(envs.jobs.judge)
+    every, judge = np.arange(machines), kind(machines)
     speed = generator.choice(task.grid, machines)
     for i in range(machines):
         machine = variants.drawn(generator)
