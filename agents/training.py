@@ -212,8 +212,8 @@ def load_checkpoint(folder: Path, kind: Any, envs: Any) -> tuple[Any, Any] | Non
         model = kind.load(io.BytesIO(state["model"]), envs, device="cpu", force_reset=False)
     except ValueError:  # of stable-baselines3, where spaces differ
         raise ModelFileError(
-            f"{folder} was trained in an environment with other observations or actions; allowed: the same machine "
-            "and --keywords"
+            f"{folder} was trained in an environment with other observations or actions; allowed: the same machine, "
+            "--keywords and --memory"
         ) from None
     for env, values in zip(_layers(model.env), state["envs"], strict=True):
         vars(env).update(values)

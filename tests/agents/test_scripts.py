@@ -51,7 +51,7 @@ def _train(script, out, steps, *options):
 @pytest.mark.parametrize("env", [WORN, OWN])
 def test_a_training_begins_with_another_policy(env, tmp_path):
     """With too few steps to learn from, it plays as the one that it began with, also on a machine of one's own."""
-    small = ("--envs", "4", "--rollout", "10", "--batch", "40")
+    small = ("--memory", "--envs", "4", "--rollout", "10", "--batch", "40")
     _train("ppo", tmp_path / "first", 40, *small)
     _train("ppo", tmp_path / "second", 40, "--env", env, "--start", tmp_path / "first", "--learning-rate", 0, *small)
     first, second = (load_policy(tmp_path / name) for name in ("first", "second"))
@@ -251,14 +251,17 @@ def test_keywords_that_are_none_end_in_one_line(script, text, tmp_path, monkeypa
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("before", [("--keywords", '{"classifier": "on"}'), ("--no-memory",)])
+@pytest.mark.parametrize("before", [("--keywords", '{"classifier": "on"}'), ("--memory",)])
 def test_a_run_with_other_observations_is_refused_in_one_line(before, tmp_path):
-    """What was trained with the classifier, or without a memory, neither goes on nor begins another training."""
+    """What was trained with the classifier, or with a memory, neither goes on nor begins another training."""
     _train("ppo", tmp_path / "on", 40, *before, *SMALL)
-    assert (load_policy(tmp_path / "on").usual is None) == (before == ("--no-memory",))
+    assert (load_policy(tmp_path / "on").usual is None) == (before != ("--memory",))
     for where in (("--out", tmp_path / "on"), ("--start", tmp_path / "on", "--out", tmp_path / "off")):
         command = [sys.executable, AGENTS / "ppo.py", *where, "--steps", 80, *SMALL]
         done = subprocess.run([str(part) for part in command], capture_output=True, text=True, check=False)
         assert done.returncode == 2
-        assert "other observations or actions; allowed: the same machine and --keywords" in done.stderr.splitlines()[-1]
+        assert (
+            "other observations or actions; allowed: the same machine, --keywords and --memory"
+            in done.stderr.splitlines()[-1]
+        )
         assert "Traceback" not in done.stderr
