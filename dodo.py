@@ -89,7 +89,7 @@ RECIPES = "datasets/datasets.toml"
 DATASETS = tuple(tomllib.loads(Path(RECIPES).read_text()))
 """Machines whose datasets are made; the options stand in ``RECIPES``."""
 
-LARGE = "--units 128 --batch 1920 --rollout 120"
+LARGE = "--memory --units 128 --envs 64 --batch 1920 --rollout 120 --epochs 6"
 FLEET = """--keywords '{"level": "fleet", "split": "train"}'"""
 
 

@@ -1,4 +1,4 @@
-"""PPO on a speed schedule, with a memory of visited speeds, to a policy that numpy plays.
+"""PPO on a speed schedule, with a memory of visited speeds if wanted, to a policy that numpy plays.
 
     python agents/ppo.py --env chaosgym/ImpactBeamTolerance-v1 --seed 0 --steps 300000 --out runs/ppo-0
 
@@ -35,21 +35,21 @@ def arguments() -> argparse.Namespace:
     parser.add_argument("--start", type=Path, default=None, help="Run folder whose policy this training begins with.")
     parser.add_argument("--fidelity", default=None, help="Rung of the machines in training; default: the task's.")
     parser.add_argument("--keywords", type=keywords, default={}, help="Of the environment in training, as JSON.")
-    parser.add_argument("--envs", type=int, default=64)
+    parser.add_argument("--envs", type=int, default=16)
     parser.add_argument("--every", type=int, default=10_000, help="Steps between rows and checkpoints.")
-    parser.add_argument("--rollout", type=int, default=60)
-    parser.add_argument("--batch", type=int, default=960)
-    parser.add_argument("--epochs", type=int, default=6)
+    parser.add_argument("--rollout", type=int, default=120)
+    parser.add_argument("--batch", type=int, default=240)
+    parser.add_argument("--epochs", type=int, default=10)
     parser.add_argument("--learning-rate", type=float, default=1e-3)
     parser.add_argument("--gamma", type=float, default=0.95)
     parser.add_argument("--gae-lambda", type=float, default=0.9)
     parser.add_argument("--units", type=int, default=64)
-    parser.add_argument("--no-memory", dest="memory", action="store_false", help="See the last step and no other.")
+    parser.add_argument("--memory", action="store_true", help="See visited speeds too; such a policy can be guarded.")
     return parser.parse_args()
 
 
 def environments(env: str, asked: argparse.Namespace) -> VecNormalize:
-    """Machines side by side, with a memory of visited speeds unless it is not wanted, normalised."""
+    """Machines side by side, with a memory of visited speeds if it is wanted, normalised."""
     native = VecMonitor(SB3VecEnv(env, asked.envs, **{"fidelity": asked.fidelity} | asked.keywords))
     return VecNormalize(SB3VisitedSpeeds(native) if asked.memory else native, gamma=asked.gamma)
 

@@ -4,16 +4,21 @@
 
 The same command goes on with a run that was interrupted, and ends as if it had not been. The folder holds progress.csv
 (a row every 10,000 steps), checkpoint.bin, which only who wrote it can load, and then policy.json and weights.npz.
+
+With ``--across-jobs --keywords '{"jobs": 5}'`` the five jobs of a machine are one episode (RL^2, Duan et al., 2016):
+the memory of the network goes on from one to the next, and so does what is expected of the future.
 """
 
 import argparse
 from pathlib import Path
+from typing import Any
 
 from training import Progress, keywords, load_checkpoint, run
 
+import numpy as np
 import torch
 from sb3_contrib import RecurrentPPO
-from stable_baselines3.common.vec_env import VecMonitor, VecNormalize
+from stable_baselines3.common.vec_env import VecEnv, VecEnvWrapper, VecMonitor, VecNormalize
 
 from chaosgym.control.policies import save_policy
 from chaosgym.control.policies.export import exported
@@ -41,13 +46,45 @@ def arguments() -> argparse.Namespace:
     parser.add_argument("--gamma", type=float, default=0.95)
     parser.add_argument("--gae-lambda", type=float, default=0.9)
     parser.add_argument("--units", type=int, default=64)
+    parser.add_argument("--across-jobs", action="store_true", help="One episode is all jobs of a machine.")
     return parser.parse_args()
+
+
+class JobsInOne(VecEnvWrapper):
+    """Ends an episode with every n-th job alone: the n jobs that each machine does in turn.
+
+    Parameters
+    ----------
+    envs
+        Environments with the keyword ``jobs``.
+    of_each
+        n.
+    """
+
+    def __init__(self, envs: VecEnv, of_each: int) -> None:
+        super().__init__(envs)
+        self.of_each, self.done = of_each, np.zeros(envs.num_envs, np.int64)
+
+    def reset(self) -> Any:
+        """Start the first job of all machines."""
+        self.done[:] = 0
+        return self.venv.reset()
+
+    def step_wait(self) -> Any:
+        """Run a step; what follows the end of a job is the beginning of the next one."""
+        observations, rewards, ended, infos = self.venv.step_wait()
+        self.done += ended
+        last = ended & (self.done % self.of_each == 0)
+        for i in np.flatnonzero(ended & ~last).tolist():
+            del infos[i]["terminal_observation"]
+        return observations, rewards, last, infos
 
 
 def train(asked: argparse.Namespace) -> None:
     """Train, or go on, until the steps are done."""
-    native = SB3VecEnv(asked.env, asked.envs, **({"fidelity": asked.fidelity} | asked.keywords))
-    envs = VecNormalize(VecMonitor(native), gamma=asked.gamma)
+    jobs = VecMonitor(SB3VecEnv(asked.env, asked.envs, **({"fidelity": asked.fidelity} | asked.keywords)))
+    episodes = JobsInOne(jobs, int(asked.keywords.get("jobs", 1))) if asked.across_jobs else jobs
+    envs = VecNormalize(episodes, gamma=asked.gamma)
     model, kept = load_checkpoint(asked.out, RecurrentPPO, envs) or (None, None)
     if model is None:
         model = RecurrentPPO(

@@ -205,12 +205,15 @@ def load_checkpoint(folder: Path, kind: Any, envs: Any) -> tuple[Any, Any] | Non
             "anything, so it is not read: choose another folder to start anew"
         )
     state = pickle.loads(signed[SIZE:])
+    before = state["envs"][0].get("num_envs")
+    if before is not None and before != envs.num_envs:
+        raise ModelFileError(f"{folder} was trained on {before} machines side by side; give --envs {before}")
     try:
         model = kind.load(io.BytesIO(state["model"]), envs, device="cpu", force_reset=False)
     except ValueError:  # of stable-baselines3, where spaces differ
         raise ModelFileError(
-            f"{folder} was trained in an environment with other observations or actions; allowed: the same machine "
-            "and --keywords"
+            f"{folder} was trained in an environment with other observations or actions; allowed: the same machine, "
+            "--keywords and --memory"
         ) from None
     for env, values in zip(_layers(model.env), state["envs"], strict=True):
         vars(env).update(values)

@@ -37,7 +37,7 @@ CROSSES = (
 
 SMALL = "--envs 16 --rollout 60 --batch 240 --every 960"
 SCRIPTS = {
-    "ppo": TRAIN,
+    "ppo": f"{TRAIN} --memory",
     "recurrent_ppo": f"--env {BEAM} --steps 960 --envs 4 --rollout 30 --batch 60 --every 120 --epochs 3 --units 16",
     "constrained_ppo": f"--env {BEAM} --steps 2880 {SMALL}",
     "sac": f"--env {BEAM} --steps 1600 --envs 8 --every 400 --gradient-steps 1",

@@ -26,6 +26,7 @@ def judges(env: str, machines: int, speeds: int, as_json: bool) -> None:
 @click.option("--machines", type=click.IntRange(8, 10_000), default=1024, show_default=True, help="That are fitted.")
 @click.option("--others", type=click.IntRange(8, 10_000), default=256, show_default=True, help="That are scored.")
 @click.option("--speeds", type=click.IntRange(1, 100), default=8, show_default=True, help="That each of them holds.")
+@click.option("--env", default="chaosgym/ImpactBeamTolerance-v1", show_default=True, help="Id whose fleet is judged.")
 @click.option("--sense", "chosen", multiple=True, help="Name of a sense; all by default; may be repeated.")
 @click.option(
     "--kept",
@@ -35,7 +36,9 @@ def judges(env: str, machines: int, speeds: int, as_json: bool) -> None:
     help="Rows that are done: they are not made again.",
 )
 @AS_JSON
-def sense(machines: int, others: int, speeds: int, chosen: tuple[str, ...], kept: Path, as_json: bool) -> None:
+def sense(
+    machines: int, others: int, speeds: int, env: str, chosen: tuple[str, ...], kept: Path, as_json: bool
+) -> None:
     """Tell how well readings tell irregular motion, by what judges them, cycles looked and error of the sensors."""
     from benchmarks.envs.sense import SENSES, lines
     from benchmarks.envs.sense import sense as run
@@ -43,7 +46,7 @@ def sense(machines: int, others: int, speeds: int, chosen: tuple[str, ...], kept
     for name in chosen:
         if name not in SENSES:
             raise click.UsageError(f"--sense {name}: allowed: {'; '.join(SENSES)}")
-    found = run(machines, others, speeds, chosen or SENSES, kept)
+    found = run(machines, others, speeds, chosen or SENSES, kept, env)
     emit({"rows": found}, as_json, lambda: lines(found))
 
 
@@ -101,13 +104,14 @@ def risk(machines: int, as_json: bool) -> None:
 @click.option("--machines", type=click.IntRange(2, 192), default=24, show_default=True)
 @click.option("--jobs", type=click.IntRange(2, 100), default=4, show_default=True, help="Of each machine.")
 @click.option("--kept", type=click.Path(dir_okay=False, path_type=Path), default=None, help="File of the returns.")
+@click.option("--policy", type=click.Path(exists=True, path_type=Path), default=None, help="Folder; default: the map.")
 @AS_JSON
-def job_memory(machines: int, jobs: int, kept: Path | None, as_json: bool) -> None:
+def job_memory(machines: int, jobs: int, kept: Path | None, policy: Path | None, as_json: bool) -> None:
     """Let the map of the beams' fleet do several jobs on each machine, forgetting and remembering the earlier ones."""
     from benchmarks.envs.job_memory import job_memory as run
     from benchmarks.envs.job_memory import lines
 
-    found = run(machines, jobs, kept)
+    found = run(machines, jobs, kept, policy)
     emit({"rows": found}, as_json, lambda: lines(found))
 
 

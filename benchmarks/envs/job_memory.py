@@ -1,8 +1,8 @@
-"""What does a learned map win if it remembers the earlier jobs of a machine?
+"""What does a policy win if it remembers the earlier jobs of a machine?
 
 Each beam of the fleet's test split does one job after another, with other demands and disturbances, from the clearance
-of the first: it was set right in between. Machines are others than those of the published tables. The map
-leaves any demand at once, and for any gain.
+of the first: it was set right in between. Machines are others than those of the published tables. By default the
+map of the fleet plays, and leaves any demand at once, and for any gain.
 """
 
 import json
@@ -17,6 +17,7 @@ from tqdm import trange
 from chaosgym.control.controllers import Follow
 from chaosgym.control.policies import load_policy
 from chaosgym.control.policies.learned_map import LearnedMap
+from chaosgym.control.policies.policy import TrainedPolicy
 from chaosgym.control.policies.shipped import shipped_folder
 from chaosgym.control.rollout import Policy, play
 from chaosgym.control.scores import MADE_WORSE, difference
@@ -29,34 +30,33 @@ FIRST_MACHINE, FIRST_SEED = 64, 25_000_000
 
 
 class Keeping:
-    """A learned map that goes on from what it felt in the last jobs of the same machines."""
+    """A learned map, or recurrent policy, that goes on from its memory of the last jobs of the same machines."""
 
-    def __init__(self, policy: LearnedMap) -> None:
+    def __init__(self, policy: LearnedMap | TrainedPolicy) -> None:
         self.policy, self.knows, self.keywords = policy, policy.knows, policy.keywords
-        self._felt: Any = None
+        self._begun = False
 
     def start(self, envs: Any) -> None:
         """Begin the next jobs."""
-        if hasattr(self.policy, "task"):
-            self._felt = self.policy.memory
+        name = "memory" if isinstance(self.policy, LearnedMap) else "_state"
+        kept = getattr(self.policy, name) if self._begun else None
         self.policy.start(envs)
-        if self._felt is not None:
-            self.policy.memory = self._felt
+        if kept is not None:
+            setattr(self.policy, name, kept)
+        self._begun = True
 
     def __call__(self, observations: Any) -> Any:
-        """Actions of the map."""
+        """Actions of the policy."""
         return self.policy(observations)
 
 
-def job_memory(machines: int, jobs: int, kept: Path | None) -> list[dict[str, Any]]:
-    """Returns of following, of the map that forgets and of the one that remembers, job by job, with differences.
+def job_memory(machines: int, jobs: int, kept: Path | None, folder: Path | None = None) -> list[dict[str, Any]]:
+    """Returns of following, of a policy that forgets and of one that remembers, job by job, with differences.
 
-    They are written into the file ``kept``, a line a job.
+    They are written into the file ``kept``, a line a job. The policy is that in ``folder``, or the shipped map.
     """
     some = range(FIRST_MACHINE, FIRST_MACHINE + machines)
-    shipped = load_policy(shipped_folder(ENV, "fleet"))
-    assert isinstance(shipped, LearnedMap)
-    forgets, remembers = (replace(shipped, least_gain=0.0, wary=False) for _ in range(2))
+    forgets, remembers = (_player(folder) for _ in range(2))
     players: dict[str, Policy] = {"follow": Follow(), "forgets": forgets, "remembers": Keeping(remembers)}
     told = []
     for job in trange(jobs, desc="jobs", unit="job", leave=False):
@@ -66,6 +66,14 @@ def job_memory(machines: int, jobs: int, kept: Path | None) -> list[dict[str, An
         if kept is not None:
             kept.write_text("".join(json.dumps(row) + "\n" for row in told), encoding="utf-8")
     return [_compared(row) for row in told] + [_compared(_later(told))] * (jobs > 2)
+
+
+def _player(folder: Path | None) -> LearnedMap | TrainedPolicy:
+    """The policy in a folder, or the shipped map without its rule."""
+    policy = load_policy(folder or shipped_folder(ENV, "fleet"))
+    if folder is None and isinstance(policy, LearnedMap):
+        return replace(policy, least_gain=0.0, wary=False)
+    return policy
 
 
 def _later(told: list[dict[str, Any]]) -> dict[str, Any]:

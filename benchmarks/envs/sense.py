@@ -1,16 +1,17 @@
 """How well do readings tell irregular motion, by what judges them, cycles looked and error of the sensors?
 
-The label is the one that is paid: whether most of the last ten cycles are irregular to ``ExponentJudge``. Beams of the
-fleet hold one speed after another for sixty cycles, with ripple and wear. Trees are fitted to machines of the training
-split, and those of the test are scored. The area under the curve (AUC) is the chance that an irregular record gets more
-than a calm one.
+The label is the one that is paid: whether most cycles of the last step are irregular to the judge of the environment.
+Machines of the fleet hold one speed after another for sixty cycles, with ripple, kicks and wear. A step has ten cycles
+on the beam, twenty on the crank. Trees are fitted to machines of the training split, and those of the test are scored.
+The area under the curve (AUC) is the chance that an irregular record gets more than a calm one.
 
-    felt            how far peaks repeat in the last ten cycles, ``chaosgym.envs.memory.irregularity``
+    felt            how far peaks repeat in the last step, ``chaosgym.envs.memory.irregularity``
     felt, all       the same over all cycles looked
     records         the shipped classifier of records
-    observation     boosted trees on what an observation holds of the last ten cycles, and on the speed
+    observation     boosted trees on what an observation holds of the last step, and on the speed
     sequence        the same on statistics of peaks of both surfaces, impacts and bouncing of all cycles, and the speed
-    shipped         the shipped sense, ``classifier="on"``, on peaks of one surface, impacts, bouncing and speed
+    shipped         what answers to ``classifier="on"``: the shipped sense, on peaks of one surface, impacts, bouncing
+                    and speed; where none is shipped, the classifier of records
 """
 
 import json
@@ -24,7 +25,6 @@ from tqdm import trange
 
 from chaosgym.classifier.shipped import default_classifier
 from chaosgym.envs.classified import RecordsAtSpeed
-from chaosgym.envs.judge import ExponentJudge
 from chaosgym.envs.kernels.steps import PLACE, REPEATS
 from chaosgym.envs.memory import irregularity
 from chaosgym.envs.vector_env import native_envs
@@ -38,11 +38,11 @@ ENV = "chaosgym/ImpactBeamTolerance-v1"
 FITTED_SEED, SCORED_SEED = 3, 2
 """Of machines and speeds."""
 
-STEP, LOOKED = 10, 60
-"""Cycles of a step, and at each speed."""
+LOOKED = 60
+"""Cycles at each speed."""
 
-LOOKS, ERRORS = (10, 30, 60), (1.0, 0.0)
-"""Cycles looked, and half widths of the error of a peak [N]; 0 for ideal sensors, of impacts and bouncing too."""
+ERRORS = 1.0, 0.0
+"""Half widths of the error of a peak [N]; 0 for ideal sensors, of impacts and bouncing too."""
 
 SENSES = ("felt", "felt, all", "records", "observation", "sequence", "shipped")
 
@@ -52,7 +52,7 @@ DRAWS = 200
 
 class Held(NamedTuple):
     """Records of n machines at h speeds: ``peaks`` (n, h, 60, 2) [N], ``impacts`` (n, h, 60) of both sides,
-    ``bouncing`` (n, h, 60) from 0 to 1, ``share`` (n, h, 6) of irregular cycles in each ten, ``speed`` (n, h) [Hz]."""
+    ``bouncing`` (n, h, 60) from 0 to 1, ``share`` (n, h, steps) of irregular cycles in each step, ``speed`` (n, h)."""
 
     peaks: Array
     impacts: Array
@@ -60,13 +60,24 @@ class Held(NamedTuple):
     share: Array
     speed: Array
 
+    @property
+    def step(self) -> int:
+        """Cycles of a step."""
+        return LOOKED // int(self.share.shape[2])
 
-def held(machines: int, speeds: int, seed: int, split: str = "train") -> Held:
+
+def looks(step: int) -> tuple[int, int, int]:
+    """Cycles looked: whole steps."""
+    return step, -(-LOOKED // 2 // step) * step, LOOKED
+
+
+def held(machines: int, speeds: int, seed: int, split: str = "train", env: str = ENV) -> Held:
     """Simulate machines of a split that hold one speed after another, at most the slew limit apart."""
-    envs = native_envs(ENV, 1, level="fleet", split=split)
+    envs = native_envs(env, 1, level="fleet", split=split)
     task, variants, generator = envs.task, envs.settings.variants, np.random.default_rng(seed)
     batch: Any = variants.batch(machines)
-    every, judge = np.arange(machines), ExponentJudge(machines)
+    kind: Any = type(envs.jobs.judge)
+    every, judge = np.arange(machines), kind(machines)
     speed = generator.choice(task.grid, machines)
     for i in range(machines):
         machine = variants.drawn(generator)
@@ -79,24 +90,31 @@ def held(machines: int, speeds: int, seed: int, split: str = "train") -> Held:
             move = task.trim_step * generator.integers(1, furthest + 1, machines) * generator.choice([-1, 1], machines)
             there = speed + move
             speed = np.where((there < task.grid[0]) | (there > task.grid[-1]), speed - move, there)
-        rippled = speed[:, None] * (1.0 + task.speed_ripple * generator.standard_normal((machines, LOOKED)))
-        cycles, growth = batch.run_varied(every, rippled)
-        shares = [judge.verdict(every, growth[:, k : k + STEP], growth)[0] for k in range(0, LOOKED, STEP)]
-        bouncing = cycles.bounce_duration.sum(axis=2) * speed[:, None]
+        if task.kick > 0.0:  # of machines that have no ripple
+            batch.set_speeds(every, speed)
+            kicks = task.kick * generator.standard_normal((machines, LOOKED, variants.nominal.n_velocities))
+            cycles, growth = batch.run_kicked(every, kicks), np.zeros((machines, LOOKED))
+        else:
+            rippled = speed[:, None] * (1.0 + task.speed_ripple * generator.standard_normal((machines, LOOKED)))
+            cycles, growth = batch.run_varied(every, rippled)
+        peaks = variants.nominal.sensed(cycles.peak_force)
+        steps = [slice(k, k + task.cycles_per_step) for k in range(0, LOOKED, task.cycles_per_step)]
+        shares = [judge.verdict(every, growth[:, step], peaks[:, step])[0] for step in steps]
+        bouncing = cycles.bounce_duration.sum(axis=2) / variants.nominal.period_at(speed)[:, None]
         if place >= 0:
             parts.append((cycles.peak_force, cycles.impacts.sum(axis=2), bouncing, np.stack(shares, 1), speed))
     return Held(*(np.stack(values, axis=1) for values in zip(*parts, strict=True)))
 
 
-def measured(true: Held, error: float, seed: int) -> Held:
+def measured(true: Held, error: float, seed: int, env: str = ENV) -> Held:
     """The records with the errors of the task's sensors, those of the peaks of half width ``error``; 0 for none."""
     if error == 0.0:
         return true
-    task, generator = native_envs(ENV, 1).task, np.random.default_rng(seed)
+    task, generator = native_envs(env, 1).task, np.random.default_rng(seed)
     peaks = np.maximum(true.peaks + generator.uniform(-error, error, true.peaks.shape), 0.0)
     counted = generator.binomial(true.impacts, 1.0 - task.missed_impacts)
     off = generator.uniform(-task.bouncing_error, task.bouncing_error, true.share.shape)
-    return true._replace(peaks=peaks, impacts=counted, bouncing=true.bouncing + off.repeat(STEP, axis=2))
+    return true._replace(peaks=peaks, impacts=counted, bouncing=true.bouncing + off.repeat(true.step, axis=2))
 
 
 def observed(peaks: Array) -> Array:
@@ -114,8 +132,8 @@ def _missed(values: Array, lag: int) -> Array:
 
 
 def observation(record: Held, looked: int) -> Array:
-    """The last ten of the cycles looked, as an observation tells them, and the speed: (n h, entries)."""
-    last = slice(looked - STEP, looked)
+    """The last step of the cycles looked, as an observation tells it, and the speed: (n h, entries)."""
+    last = slice(looked - record.step, looked)
     values = observed(_flat(record.peaks)[:, last, 0])
     values[:, PLACE.speed] = record.speed.ravel()
     values[:, PLACE.impacts_per_cycle] = _flat(record.impacts)[:, last].mean(axis=1)
@@ -124,10 +142,10 @@ def observation(record: Held, looked: int) -> Array:
 
 
 def statistics(record: Held, looked: int) -> Array:
-    """Statistics of all cycles looked, and of the last ten: (n h, columns)."""
+    """Statistics of all cycles looked, and of the last step: (n h, columns)."""
     peaks, columns = _flat(record.peaks)[:, :looked], [record.speed.ravel()]
     for side in (0, 1):
-        for part in (peaks[:, :, side], peaks[:, -STEP:, side]):
+        for part in (peaks[:, :, side], peaks[:, -record.step :, side]):
             columns += [part.mean(axis=1), part.std(axis=1), part.min(axis=1), part.max(axis=1)]
             columns += [_missed(part, lag) for lag in (1, 2, 3, 4, 6, 8)]
         columns += [irregularity(observed(peaks[:, :, side]))]
@@ -142,18 +160,18 @@ def _flat(values: Array) -> Array:
     return values.reshape(-1, *values.shape[2:])
 
 
-def scores(sense: str, error: float, fitted: Held, scored: Held) -> dict[int, Array]:
+def scores(sense: str, error: float, fitted: Held, scored: Held, env: str = ENV) -> dict[int, Array]:
     """What a sense makes of the scored records (n h,), the more the more irregular, by cycles looked."""
     if sense == "shipped":
-        return shipped(error, scored)
+        return shipped(error, scored, env)
     peaks = _flat(scored.peaks)[:, :, 0]
     found = {}
-    for looked in LOOKS:
+    for looked in looks(scored.step):
         if sense.startswith("felt"):
-            first = 0 if sense == "felt, all" else looked - STEP
+            first = 0 if sense == "felt, all" else looked - scored.step
             found[looked] = irregularity(observed(peaks[:, first:looked]))
         elif sense == "records":
-            classifier = default_classifier("impact-beam")
+            classifier = default_classifier(native_envs(env, 1).nominal.name)
             found[looked] = classifier.irregular_probability(peaks[:, :looked], max(error, 1e-6))
         else:
             features = observation if sense == "observation" else statistics
@@ -162,23 +180,23 @@ def scores(sense: str, error: float, fitted: Held, scored: Held) -> dict[int, Ar
     return found
 
 
-def shipped(error: float, scored: Held) -> dict[int, Array]:
-    """What the shipped sense makes of the scored records (n h,), by cycles looked."""
+def shipped(error: float, scored: Held, env: str = ENV) -> dict[int, Array]:
+    """What ``classifier="on"`` makes of the scored records (n h,), by cycles looked."""
     peaks, impacts, bouncing = _flat(scored.peaks)[:, :, 0], _flat(scored.impacts), _flat(scored.bouncing)
     every = np.arange(len(peaks))
-    records = RecordsAtSpeed(native_envs(ENV, 1).nominal, error, len(peaks))
+    records = RecordsAtSpeed(native_envs(env, 1).nominal, error, len(peaks))
     found = {}
-    for first in range(0, LOOKED, STEP):
-        cycles = slice(first, first + STEP)
+    for first in range(0, LOOKED, scored.step):
+        cycles = slice(first, first + scored.step)
         means = (values[:, cycles].mean(axis=1) for values in (impacts, bouncing))
         records.add(every, scored.speed.ravel(), peaks[:, cycles], *means)
-        found[first + STEP] = records.irregular_probability(every)
+        found[first + scored.step] = records.irregular_probability(every)
     return found
 
 
 def labels_of(record: Held, looked: int) -> Array:
-    """Whether most of the last ten of the cycles looked are irregular, (n h,)."""
-    return np.asarray(record.share[:, :, looked // STEP - 1].ravel() > 0.5)
+    """Whether most cycles of the last step of those looked are irregular, (n h,)."""
+    return np.asarray(record.share[:, :, looked // record.step - 1].ravel() > 0.5)
 
 
 def boosted() -> Any:
@@ -201,15 +219,18 @@ def area(labels: Array, score: Array, machines: int) -> dict[str, float]:
     return {"auc": float(roc_auc_score(labels, score)), "low": float(low), "high": float(high)}
 
 
-def sense(machines: int, others: int, speeds: int, senses: Iterable[str], kept: Path) -> list[dict[str, Any]]:
+def sense(
+    machines: int, others: int, speeds: int, senses: Iterable[str], kept: Path, env: str = ENV
+) -> list[dict[str, Any]]:
     """Areas under the curve of each sense, by error and cycles looked; rows in the file ``kept`` are not made anew.
 
     Raises
     ------
     ParameterError
-        If the file holds rows of other numbers of machines or speeds.
+        If the file holds rows of other numbers of machines or speeds, or of another environment.
     """
-    about = {"machines": machines, "others": others, "speeds": speeds}
+    about: dict[str, Any] = {"machines": machines, "others": others, "speeds": speeds}
+    about |= {} if env == ENV else {"env": env}
     told: dict[str, Any] = json.loads(kept.read_text(encoding="utf-8")) if kept.exists() else {"of": about, "rows": []}
     if told["of"] != about:
         raise ParameterError(f"{kept} is of {told['of']}; give these numbers, or another file")
@@ -217,11 +238,15 @@ def sense(machines: int, others: int, speeds: int, senses: Iterable[str], kept: 
     done = {(row["sense"], row["error"]) for row in rows}
     missing = [(name, error) for name in senses for error in ERRORS if (name, error) not in done]
     if missing:
-        true = held(machines, speeds, FITTED_SEED), held(others, speeds, SCORED_SEED, "test")
+        true = (
+            held(machines, speeds, FITTED_SEED, env=env),
+            held(others, speeds, SCORED_SEED, "test", env),
+        )
     for name, error in missing:
-        fitted, scored = (measured(record, error, seed) for seed, record in enumerate(true))
-        found = scores(name, error, fitted, scored)
-        areas = {str(looked): area(labels_of(scored, looked), found[looked], others) for looked in LOOKS}
+        fitted, scored = (measured(record, error, seed, env) for seed, record in enumerate(true))
+        found = scores(name, error, fitted, scored, env)
+        chosen = looks(scored.step)
+        areas = {str(looked): area(labels_of(scored, looked), found[looked], others) for looked in chosen}
         rows.append({"sense": name, "error": error, "areas": areas})
         write_atomically(kept, lambda path: path.write_text(json.dumps(told, indent=1) + "\n", encoding="utf-8"))
     return [row for row in rows if row["sense"] in senses]
@@ -229,12 +254,14 @@ def sense(machines: int, others: int, speeds: int, senses: Iterable[str], kept: 
 
 def lines(found: Iterable[Mapping[str, Any]]) -> list[str]:
     """A Markdown table."""
+    rows = sorted(found, key=lambda row: (SENSES.index(row["sense"]), -row["error"]))
+    cycles = list(rows[0]["areas"])
     told = [
-        f"| sense | error | {' | '.join(f'{looked} cycles' for looked in LOOKS)} |",
-        "|---" * (2 + len(LOOKS)) + "|",
+        f"| sense | error | {' | '.join(f'{looked} cycles' for looked in cycles)} |",
+        "|---" * (2 + len(cycles)) + "|",
     ]
-    for row in sorted(found, key=lambda row: (SENSES.index(row["sense"]), -row["error"])):
-        areas = [row["areas"][str(looked)] for looked in LOOKS]
+    for row in rows:
+        areas = [row["areas"][looked] for looked in cycles]
         cells = [f"{one['auc']:.3f} ({one['low']:.3f} to {one['high']:.3f})" for one in areas]
         told.append(f"| {row['sense']} | {row['error']:g} N | {' | '.join(cells)} |")
     return told

@@ -117,6 +117,17 @@ def test_other_environments_than_those_of_the_run_are_refused(tmp_path):
         load_checkpoint(tmp_path, Model, Env())
 
 
+def test_another_number_of_environments_is_refused(tmp_path):
+    """The states of eight do not fit into four."""
+    envs = Env()
+    envs.num_envs = 8
+    save_checkpoint(tmp_path, Model(envs, 7))
+    assert load_checkpoint(tmp_path, Model, envs)[0].weight == 7
+    envs.num_envs = 4
+    with pytest.raises(ModelFileError, match="give --envs 8"):
+        load_checkpoint(tmp_path, Model, envs)
+
+
 def test_the_key_lies_where_the_user_keeps_state(tmp_path, monkeypatch):
     """``~/.local/state`` unless told otherwise, also if the folder is there; made once, and for every checkpoint."""
     monkeypatch.delenv("XDG_STATE_HOME")

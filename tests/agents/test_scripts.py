@@ -16,6 +16,7 @@ import chaosgym
 from chaosgym.control.comparison import read_comparison
 from chaosgym.control.policies import load_policy
 from chaosgym.control.rollout import play
+from chaosgym.envs import SB3VecEnv
 from chaosgym.envs.sense import STATISTICS, load_sense
 
 AGENTS = Path(__file__).parent.parent.parent / "agents"
@@ -50,7 +51,7 @@ def _train(script, out, steps, *options):
 @pytest.mark.parametrize("env", [WORN, OWN])
 def test_a_training_begins_with_another_policy(env, tmp_path):
     """With too few steps to learn from, it plays as the one that it began with, also on a machine of one's own."""
-    small = ("--envs", "4", "--rollout", "10", "--batch", "40")
+    small = ("--memory", "--envs", "4", "--rollout", "10", "--batch", "40")
     _train("ppo", tmp_path / "first", 40, *small)
     _train("ppo", tmp_path / "second", 40, "--env", env, "--start", tmp_path / "first", "--learning-rate", 0, *small)
     first, second = (load_policy(tmp_path / name) for name in ("first", "second"))
@@ -181,6 +182,27 @@ def test_a_constraint_is_the_budget_of_the_task(tmp_path, monkeypatch):
     assert limits == [gym.make(BEAM).unwrapped.task.cost_budget, 0.2]
 
 
+def test_the_jobs_of_a_machine_are_one_episode(monkeypatch):
+    """Only the third of three jobs ends an episode; the first observation of each other job follows within it."""
+    monkeypatch.syspath_prepend(str(AGENTS))
+    from recurrent_ppo import JobsInOne
+
+    given = {"jobs": 3, "steps": 4, "level": "fleet", "split": "train"}
+    plain, joined = SB3VecEnv(BEAM, 2, **given), JobsInOne(SB3VecEnv(BEAM, 2, **given), 3)
+    for envs in (plain, joined):
+        envs.seed(5)
+        envs.reset()
+    clearances = []
+    for step in range(1, 25):
+        (expected, _, ended, _), (seen, _, last, infos) = (envs.step(np.zeros(2, int)) for envs in (plain, joined))
+        np.testing.assert_array_equal(seen, expected)
+        assert (ended == (step % 4 == 0)).all()
+        assert (last == (step % 12 == 0)).all()
+        assert [("terminal_observation" in info) for info in infos] == last.tolist()
+        clearances.append(infos[0]["clearance"])
+    assert len(set(clearances[::4])) == 2, "a machine for each three jobs, as new in each"
+
+
 def test_what_an_export_needs_is_named(tmp_path):
     """Without Minari: exit code 2, one line that says what to install, and no folder."""
     (tmp_path / "minari.py").write_text("raise ModuleNotFoundError(\"No module named 'minari'\")")
@@ -229,14 +251,17 @@ def test_keywords_that_are_none_end_in_one_line(script, text, tmp_path, monkeypa
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("before", [("--keywords", '{"classifier": "on"}'), ("--no-memory",)])
+@pytest.mark.parametrize("before", [("--keywords", '{"classifier": "on"}'), ("--memory",)])
 def test_a_run_with_other_observations_is_refused_in_one_line(before, tmp_path):
-    """What was trained with the classifier, or without a memory, neither goes on nor begins another training."""
+    """What was trained with the classifier, or with a memory, neither goes on nor begins another training."""
     _train("ppo", tmp_path / "on", 40, *before, *SMALL)
-    assert (load_policy(tmp_path / "on").usual is None) == (before == ("--no-memory",))
+    assert (load_policy(tmp_path / "on").usual is None) == (before != ("--memory",))
     for where in (("--out", tmp_path / "on"), ("--start", tmp_path / "on", "--out", tmp_path / "off")):
         command = [sys.executable, AGENTS / "ppo.py", *where, "--steps", 80, *SMALL]
         done = subprocess.run([str(part) for part in command], capture_output=True, text=True, check=False)
         assert done.returncode == 2
-        assert "other observations or actions; allowed: the same machine and --keywords" in done.stderr.splitlines()[-1]
+        assert (
+            "other observations or actions; allowed: the same machine, --keywords and --memory"
+            in done.stderr.splitlines()[-1]
+        )
         assert "Traceback" not in done.stderr

@@ -5,7 +5,7 @@ import json
 import numpy as np
 import pytest
 
-from benchmarks.envs.sense import Held, area, held, lines, measured, observation, observed, sense, statistics
+from benchmarks.envs.sense import Held, area, held, lines, looks, measured, observation, observed, sense, statistics
 from chaosgym.envs.kernels.steps import PLACE
 from chaosgym.envs.memory import irregularity
 from chaosgym.envs.vector_env import native_envs
@@ -71,9 +71,9 @@ def test_a_sense_that_knows_has_an_area_of_one():
 def test_rows_are_kept(tmp_path, monkeypatch):
     """Every sense but the records' tells scatter of 20 N from none; a second call simulates nothing."""
     monkeypatch.setattr(
-        "benchmarks.envs.sense.held", lambda machines, speeds, seed, split="train": made_up(machines, seed)
+        "benchmarks.envs.sense.held", lambda machines, speeds, seed, split="train", env=ENV: made_up(machines, seed)
     )
-    monkeypatch.setattr("benchmarks.envs.sense.LOOKS", (10, 60))
+    monkeypatch.setattr("benchmarks.envs.sense.looks", lambda step: (step, 60))
     monkeypatch.setattr("benchmarks.envs.sense.DRAWS", 20)
     kept, senses = tmp_path / "sense.json", ("felt", "felt, all", "observation", "sequence", "shipped")
     found = sense(40, 40, 4, senses, kept)
@@ -85,6 +85,17 @@ def test_rows_are_kept(tmp_path, monkeypatch):
     with pytest.raises(ParameterError, match="give these numbers"):
         sense(41, 40, 4, senses, kept)
     assert json.loads(kept.read_text())["of"]["machines"] == 40
+
+
+def test_cranks_hold_speeds_in_steps_of_their_own():
+    """Twenty cycles make a step; kicks, and no ripple, keep a calm crank from repeating exactly."""
+    record = held(3, 1, 1, env="chaosgym/SliderCrankTolerance-v1")
+    assert record.share.shape == (3, 1, 3)
+    assert record.step == 20
+    assert looks(record.step) == (20, 40, 60)
+    assert looks(10) == (10, 30, 60)
+    assert ((record.bouncing >= 0.0) & (record.bouncing <= 1.0)).all()
+    assert (np.ptp(record.peaks[:, :, -20:, 0], axis=2) > 0.0).all()
 
 
 def test_a_longer_look_is_another_number():

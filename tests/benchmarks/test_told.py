@@ -6,7 +6,8 @@ from benchmarks.envs import job_memory, risk
 from benchmarks.envs.job_memory import ENV, FLEET, Keeping
 from benchmarks.envs.told import MIXED, Mixed, Sensed, Told, Watched, _mixed
 from chaosgym.control.controllers.controller import added, place_of, seen
-from chaosgym.control.policies import shipped_policy
+from chaosgym.control.policies import TrainedPolicy, load_policy, save_policy, shipped_policy
+from chaosgym.control.policies.network import Dense, Lstm, Network
 from chaosgym.envs.vector_env import native_envs
 
 
@@ -53,6 +54,28 @@ def test_a_map_that_remembers_begins_where_it_ended():
     np.testing.assert_array_equal(policy.memory, felt)
     policy.start(envs)
     assert not policy.memory.any()
+
+
+def test_a_recurrent_policy_remembers_and_is_compared(monkeypatch, tmp_path):
+    """Its state goes on into the next job, and its returns are compared as those of the map are."""
+    units = 2
+    gates = (
+        np.ones((4 * units, 14), np.float32),
+        np.ones((4 * units, units), np.float32),
+        np.ones(4 * units, np.float32),
+    )
+    layer = Dense(np.eye(6, units, dtype=np.float32), np.zeros(6, np.float32), "none")
+    save_policy(TrainedPolicy(ENV, "trim", Network(Lstm(*gates), (layer,))), tmp_path)
+    envs = native_envs(ENV, 2, **FLEET)
+    observations, _ = envs.reset(seed=[1, 2])
+    player = Keeping(load_policy(tmp_path))
+    player.start(envs)
+    player(observations)
+    felt = player.policy._state
+    player.start(envs)
+    assert player.policy._state is felt
+    monkeypatch.setattr(job_memory, "FLEET", FLEET | {"steps": 6})
+    assert len(job_memory.job_memory(2, 2, None, tmp_path)) == 2
 
 
 def test_jobs_are_compared_in_pairs(monkeypatch, tmp_path):

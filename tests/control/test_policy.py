@@ -6,7 +6,7 @@ import gymnasium as gym
 import numpy as np
 import pytest
 from sb3_contrib import RecurrentPPO
-from stable_baselines3 import PPO, SAC
+from stable_baselines3 import DQN, PPO, SAC
 from stable_baselines3.common.vec_env import VecNormalize
 
 from chaosgym.control.policies import TrainedPolicy, load_policy, save_policy, shipped_policy
@@ -25,6 +25,7 @@ MODELS = {
     "PPO": lambda: trained(PPO, "MlpPolicy", **SMALL),
     "PPO that explores by state": lambda: trained(PPO, "MlpPolicy", {"action": "continuous"}, use_sde=True, **SMALL),
     "recurrent PPO": lambda: trained(RecurrentPPO, "MlpLstmPolicy", policy_kwargs={"lstm_hidden_size": 16}, **SMALL),
+    "DQN": lambda: trained(DQN, "MlpPolicy", learning_starts=2, train_freq=1, learning_rate=0.05, buffer_size=100),
     "SAC": lambda: trained(
         SAC, "MlpPolicy", {"action": "continuous"}, learning_starts=16, batch_size=16, buffer_size=100
     ),

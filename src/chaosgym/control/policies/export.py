@@ -1,6 +1,6 @@
 """From a policy trained with stable-baselines3 to one that numpy plays: its weights are read out as arrays.
 
-Knows the multilayer policies of PPO and SAC and the one-layer LSTM policy of sb3-contrib's RecurrentPPO, without
+Knows the multilayer policies of PPO, SAC and DQN and the one-layer LSTM policy of sb3-contrib's RecurrentPPO, without
 importing any of them.
 """
 
@@ -20,7 +20,7 @@ def exported(model: Any, env: str, envs: Any, *, memory: bool = False) -> Traine
     Parameters
     ----------
     model
-        PPO, SAC or RecurrentPPO.
+        PPO, SAC, DQN or RecurrentPPO.
     env
         Id of the environment, or the file of the machine.
     envs
@@ -47,10 +47,13 @@ def exported(model: Any, env: str, envs: Any, *, memory: bool = False) -> Traine
     weights = {name: values.detach().cpu().numpy() for name, values in model.policy.state_dict().items()}
     if hasattr(model.policy, "actor") and hasattr(model.policy.actor, "latent_pi"):
         hidden, last = "actor.latent_pi", "actor.mu"
+    elif hasattr(model.policy, "q_net"):
+        hidden, last = "q_net.q_net", ""
     else:
         hidden, last = "mlp_extractor.policy_net", "action_net"
     activation = model.policy.activation_fn.__name__.lower()
     places = sorted(int(name.split(".")[-2]) for name in weights if name.startswith(hidden) and name.endswith("weight"))
+    last = last or f"{hidden}.{places.pop()}"
     names = [*((f"{hidden}.{place}", activation) for place in places), (last, "none")]
     network = Network(_lstm(weights), tuple(_dense(weights, name, kind) for name, kind in names))
     usual = None
@@ -77,7 +80,9 @@ def _dense(weights: dict[str, Any], name: str, activation: str) -> Dense:
     try:
         return Dense(weights[f"{name}.weight"], weights[f"{name}.bias"], activation)
     except KeyError as error:
-        raise ModelFileError(f"the policy has no {error}; known: dense policies of PPO, SAC and RecurrentPPO") from None
+        raise ModelFileError(
+            f"the policy has no {error}; known: dense policies of PPO, SAC, DQN and RecurrentPPO"
+        ) from None
 
 
 def _lstm(weights: dict[str, Any]) -> Lstm | None:
