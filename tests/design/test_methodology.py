@@ -10,17 +10,20 @@ import pytest
 from chaosgym import read_machine
 from chaosgym.design import Criteria, assess, improve, variation_region
 from chaosgym.design.bearing import evaluate
+from chaosgym.design.brief import read_brief
 from chaosgym.design.changes import change_cost, default_changes
 from chaosgym.design.checks import Check
 from chaosgym.design.fatigue import equivalent_force, rating_life
 from chaosgym.design.improve import _rank
 from chaosgym.design.reliability import hertz_pressure, normal_reliability
 from chaosgym.design.runs import build_series, settled_run
+from chaosgym.design.study import study
 from chaosgym.design.trends import fit_trend
 from chaosgym.design.trials import Trial
 from chaosgym.diagnosis import Tolerance
 from chaosgym.errors import ParameterError
 from chaosgym.machines import MACHINES, ImpactBeam
+from chaosgym.machines.machine_file import template
 from chaosgym.machines.parameters import with_settings
 from tests.design.small import small_studies
 from tests.plain_modes import PLAIN_BEAM
@@ -35,6 +38,21 @@ def chaotic():
     """The beam of the thesis at 30 Hz, with criteria it misses."""
     asked = Criteria(load_rating=500.0, life=2000.0, reliability=0.999, machines_that_meet=0.9, **STEEL)
     return assess(ImpactBeam(), REGION, asked, series_size=8)
+
+
+def test_chaos_beside_a_motion_within_the_tolerances_counts(tmp_path):
+    """A mass of 2 kg is periodic from rest throughout its tolerances; at a gap 5 % smaller chaos with 135 N coexists,
+    so it is of Type III, and its life is that under 135 N."""
+    text = template("mass")
+    for old, new in (("10 Hz", "22.508 Hz"), ("0.2 mm", "0.1 mm"), ("20 N", "65 N"), ("16 Hz", "17 Hz")):
+        text = text.replace(f'"{old}"', f'"{new}"')
+    (tmp_path / "bracket.toml").write_text(text)
+    brief = replace(read_brief(tmp_path / "bracket.toml"), series_size=8)
+    found = study(brief, verdict_only=True, workers=1).assessment
+    assert [one.nature for one in found.series.runs] == ["periodic"] * 8
+    assert found.type == "III"
+    assert found.evaluation.largest_force == pytest.approx(135.0, abs=1.5)
+    assert found.evaluation.largest_force > 1.1 * max(one.largest_peak for one in found.series.built)
 
 
 def test_a_periodic_machine_without_tolerances_gives_the_classical_answer():

@@ -197,7 +197,7 @@ def test_no_machine_of_the_region_is_overlooked():
         natures = ["periodic"] * 4
         natures[odd] = "undetermined"
         kind, why = judge_type("periodic", 100.0, CALM + machines(*natures))
-        assert (kind, why) == ("II", "1 of 9 points in the tolerances are not periodic (1 undetermined)")
+        assert (kind, why) == ("II", "1 of 9 points in the tolerances is not periodic (1 undetermined)")
     kind, why = judge_type("periodic", 100.0, CALM + machines(*["periodic"] * 4, peak=111.0))
     assert (kind, why) == ("II", "peak force 11% higher above the nominal speed and above the nominal gap")
 

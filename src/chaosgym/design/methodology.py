@@ -37,6 +37,7 @@ from chaosgym.design.texts import listed
 from chaosgym.design.trends import Trend, fit_trend
 from chaosgym.design.wear import Wear, WearLife, wear_life
 from chaosgym.diagnosis import Neighbour, ResponseType, Tolerance, default_tolerances, diagnose, response_type
+from chaosgym.diagnosis.type_rule import FORCE_CHANGE
 from chaosgym.machines import Machine
 from chaosgym.machines.parameters import parameters_of
 from chaosgym.plain import Result, plain
@@ -280,11 +281,13 @@ def _by_type(
         return evaluate(
             [peaks], criteria, "Type I: the trend, taken to the unfavourable corner of the tolerances", seed
         )
-    if response.type == "II" or response.coexists:
-        why = "motions coexist, and which one runs depends on how it started: " if response.type == "III" else ""
+    blocks = [run.worse_side(exponent) for run in (nominal, *series.runs)]
+    unseen = worst > (1.0 + FORCE_CHANGE) * max(float(block.max(initial=0.0)) for block in blocks)
+    if response.type == "II" or response.coexists or unseen:
+        mixed = "motions coexist, and which one runs depends on how it started: " if response.type == "III" else ""
+        why = mixed if response.coexists or not unseen else "a motion in the tolerances exceeds all of the series: "
         method = f"Type {response.type}: {why}the largest peak force found in the tolerances, in every cycle"
         return evaluate([np.array([worst])], criteria, method, seed)
-    blocks = [run.worse_side(exponent) for run in (nominal, *series.runs)]
     if len(blocks) == 1:
         return evaluate(time_blocks(blocks[0]), criteria, "Type III: statistics of the nominal machine", seed)
     return evaluate(blocks, criteria, "Type III: statistics over all machines in the tolerances", seed)

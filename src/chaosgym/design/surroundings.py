@@ -23,7 +23,7 @@ MIDDLE = len(MAP_SHARES) // 2
 
 
 def in_tolerance(around: ResponseMap | None) -> tuple[Neighbour, ...]:
-    """Machines of the map within the tolerances of speed and clearance, but for the nominal one."""
+    """Machines of the map within the tolerances of speed and clearance, by their worst motions; not the nominal one."""
     if around is None:
         return ()
     shares = MAP_SHARES if len(around.speed) == len(MAP_SHARES) else WITHIN
@@ -32,8 +32,8 @@ def in_tolerance(around: ResponseMap | None) -> tuple[Neighbour, ...]:
     return tuple(
         Neighbour(
             dict(zip(fields, (float(shares[i]), float(shares[j])), strict=True)),
-            str(around.nature[i, j]),
-            float(np.nan_to_num(around.largest_peak[i, j])),
+            str(around.worst_nature[i, j]),
+            float(np.nan_to_num(around.worst_peak[i, j])),
         )
         for i in inside
         for j in inside
@@ -44,7 +44,8 @@ def in_tolerance(around: ResponseMap | None) -> tuple[Neighbour, ...]:
 def map_around(brief: DesignBrief, workers: int | None, progress: bool, *, within: bool = False) -> ResponseMap | None:
     """Types over speed and clearance; None where these do not vary or leave their range.
 
-    ``within`` leaves out machines beyond the tolerances: natures and forces within stay the same, types mean nothing.
+    ``within`` leaves out machines beyond the tolerances: types there mean nothing then. States that are carried along
+    the speeds begin within, too.
     """
     machine, region = brief.machine, brief.region
     for name in (machine.speed_field, machine.clearance_field):
@@ -60,7 +61,7 @@ def map_around(brief: DesignBrief, workers: int | None, progress: bool, *, withi
             speeds,
             clearances,
             {} if within else region,
-            initial_states=1 if within else MAP_STARTS,
+            initial_states=MAP_STARTS,
             budget=DIAGNOSIS_BUDGET,
             workers=workers,
             progress=progress,

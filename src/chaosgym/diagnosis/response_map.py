@@ -49,6 +49,8 @@ class ResponseMap(Result):
         Type over the neighbourhood, and nature at the point.
     largest_peak : (n_speeds, n_clearances)
         [N].
+    worst_nature, worst_peak : (n_speeds, n_clearances)
+        Nature and largest peak [N] of that motion at the point which matters most: chaos, else the largest force.
     runs
         Number of machines that were run; without sharing it would be 25 times the number of points.
     definition
@@ -63,6 +65,8 @@ class ResponseMap(Result):
     type: NDArray[np.str_]
     nature: NDArray[np.str_]
     largest_peak: Array
+    worst_nature: NDArray[np.str_]
+    worst_peak: Array
     runs: int
     definition: Mapping[str, Any]
 
@@ -151,8 +155,8 @@ def response_map(
     verdicts = parallel_map(judge, places, workers=workers, progress="map" if progress else None)
     runs = dict(zip(places, verdicts, strict=True))
     others = _others(at_place, centres.values(), runs, initial_states, budget, workers)
-    types, natures = np.full(shape, "undetermined"), np.full(shape, "undetermined")
-    peaks = np.full(shape, np.nan)
+    types, natures, worst = (np.full(shape, "undetermined") for _ in range(3))
+    peaks, worst_peaks = np.full(shape, np.nan), np.full(shape, np.nan)
     for at, place in centres.items():
         centre = runs[place]
         if centre is None:
@@ -161,6 +165,7 @@ def response_map(
         neighbours = [
             _neighbour(one, runs[near], others.get(near, ())) for one, near in zip(points, around[at], strict=True)
         ]
+        _, worst[at], worst_peaks[at] = _neighbour({}, centre, others.get(place, ()))
         types[at] = judge_type(centre.nature, float(peaks[at]), neighbours, others.get(place, ()))[0]
     return ResponseMap(
         machine=machine,
@@ -169,6 +174,8 @@ def response_map(
         type=types,
         nature=natures,
         largest_peak=peaks,
+        worst_nature=worst,
+        worst_peak=worst_peaks,
         runs=len(places),
         definition=define(allowed, "speed-clearance", "rest", initial_states, budget, sensor_error),
     )

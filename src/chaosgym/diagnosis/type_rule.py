@@ -106,7 +106,8 @@ def _by_the_region(points: Sequence[Neighbour], largest_peak: float) -> tuple[Ty
     """Type of a periodic response and its reason, by the points around it alone."""
     restless = [point for point in points if point.nature != "periodic"]
     if restless:
-        found = f"{len(restless)} of {len(points) + 1} points in the tolerances are not periodic"
+        are = "is" if len(restless) == 1 else "are"
+        found = f"{len(restless)} of {len(points) + 1} points in the tolerances {are} not periodic"
         unknown = sum(point.nature == "undetermined" for point in restless)
         found += f" ({unknown} undetermined)" if unknown else ""
         calm = [point.shares for point in points if point.nature == "periodic"]
