@@ -7,7 +7,9 @@ import pytest
 from scipy.io import mmwrite
 from scipy.sparse import coo_array, random_array
 
+from chaosgym import read_machine
 from chaosgym.errors import ParameterError
+from chaosgym.machines.machine_file import template
 from chaosgym.machines.modal_machine import archives
 from chaosgym.machines.modal_machine.archives import read_archive, read_matrix
 
@@ -169,3 +171,11 @@ def test_an_array_of_numpy(tmp_path):
     np.save(buffer, np.array([None]), allow_pickle=True)
     (tmp_path / "K.npy").write_bytes(buffer.getvalue())
     assert refused(read_matrix, tmp_path / "K.npy").startswith("can't be read as a matrix: an array holds objects")
+
+
+def test_a_stiffness_in_place_of_a_matrix_is_told_how_to_be_stated(tmp_path):
+    """A mass of 2 kg on 40 kN/m is two numbers for an engineer; here a stiffness is the file of a matrix."""
+    text = template("mass").replace('frequencies = "10 Hz"', 'stiffness = "40 kN/m"')
+    (tmp_path / "stiff.toml").write_text(text)
+    with pytest.raises(ParameterError, match=r"'40 kN/m' is no file: .*frequencies = sqrt\(k / m\)"):
+        read_machine(tmp_path / "stiff.toml")

@@ -1,6 +1,7 @@
 """The file of modes or matrices, joints and drives: its tables in SI, and a class of machines out of them."""
 
 import math
+import re
 from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
@@ -27,6 +28,9 @@ from chaosgym.machines.parameters import described_as, parameter, parameters_of
 from chaosgym.machines.stated import class_with, range_of, tolerances_of
 from chaosgym.numbers import number
 from chaosgym.units import TURNING
+
+AMOUNT = re.compile(r"[-+]?\d[\d.,e+-]*(\s|$)")
+"""How a number begins, with a unit or without."""
 
 SAMPLED = ("drive", "joint", "spring")
 """Tables that take samples of a cycle."""
@@ -89,10 +93,22 @@ def _joints(rows: list[Any]) -> list[dict[str, Any]]:
 
 
 def files_of(values: Mapping[str, Any], folder: Path) -> list[Path]:
-    """Files that a machine's file names, whose tables have been checked."""
+    """Files that a machine's file names, whose tables have been checked.
+
+    Raises
+    ------
+    ParameterError
+        If a number stands where the file of a matrix is named.
+    """
     names = ("matrices", "mass", "stiffness", "damping", "universal_file")
-    named = [values["structure"][name] for name in names if name in values["structure"]]
-    return [folder / name for name in (*named, *cycle_file.files_of(values))]
+    named = {name: values["structure"][name] for name in names if name in values["structure"]}
+    for key, name in named.items():
+        if AMOUNT.match(name) and not (folder / name).exists():
+            raise ParameterError(
+                f"structure.{key} = {name!r} is no file: it names the file of a matrix; of one mass m on a stiffness k "
+                "state modal_masses = m and frequencies = sqrt(k / m) / (2 pi)"
+            )
+    return [folder / name for name in (*named.values(), *cycle_file.files_of(values))]
 
 
 def built(path: str, digest: str, data: Mapping[str, Any], folder: Path) -> type[Machine]:
