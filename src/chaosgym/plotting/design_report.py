@@ -63,6 +63,7 @@ NAMES = {
     "youngs_modulus": "Young's modulus",
     "n_modes": "number of modes",
     "fitted_modes": "number of fitted modes",
+    "definition": "everything else of the file, as a fingerprint",
 }
 """Names of criteria and parameters that their own do not tell well."""
 
