@@ -128,7 +128,8 @@ def test_looking_ahead_searches_every_ten_steps_and_at_a_new_demand(monkeypatch)
 
 def test_a_bar_is_shown_only_where_it_is_asked_for(capsys):
     """A job that is played by a script says nothing on standard error."""
-    play(Follow(), BEAM, [12], steps=2)
+    played = play(Follow(), BEAM, [12], steps=2)
+    assert {"machine": 12, "seed": played.seeds[0], "env": BEAM}.items() <= played.as_dict().items()
     assert capsys.readouterr().err == ""
     play(Follow(), BEAM, [12], steps=2, progress="a job")
     assert "a job" in capsys.readouterr().err
