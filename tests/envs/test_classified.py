@@ -52,11 +52,12 @@ def of_one(record, lags=(1, 2, 3, 4, 6, 8)):
 
 
 def test_a_network_gives_the_logistic_of_its_last_layer():
-    """Two entries, one rectified unit and one answer, by hand: a chance from 0 to 1, a half where nothing is said."""
+    """Two rectified units in turn and one answer, by hand: a chance from 0 to 1, a half where nothing is said."""
     entries = len(STATISTICS)
-    weights = np.zeros((1, entries)), np.array([[2.0]])
+    weights = np.zeros((1, entries)), np.array([[1.0]]), np.array([[2.0]])
     weights[0][0, 0] = 1.0
-    sense = Sense(1.0, np.zeros(entries), np.ones(entries), weights, (np.zeros(1), np.array([-1.0])))
+    biases = np.zeros(1), np.zeros(1), np.array([-1.0])
+    sense = Sense(1.0, np.zeros(entries), np.ones(entries), weights, biases)
     statistics = np.zeros((3, entries))
     statistics[:, 0] = [0.5, 3.0, -3.0]
     expected = [0.5, 1.0 / (1.0 + math.exp(-5.0)), 1.0 / (1.0 + math.exp(1.0))]

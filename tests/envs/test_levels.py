@@ -168,6 +168,14 @@ def test_what_is_refused_says_what_to_do(keywords, message):
         native_envs(BEAM, **keywords)
 
 
+def test_pictures_of_another_program_are_refused_by_its_name():
+    """Any machine has none either, and says so."""
+    with pytest.raises(ParameterError, match="not possible with split = 'other_simulator'; allowed: None"):
+        gym.make(BEAM, split="other_simulator", render_mode="rgb_array")
+    with pytest.raises(ParameterError, match="not possible with any machine; allowed: None"):
+        gym.make("chaosgym/AnyMachine-v0", render_mode="rgb_array")
+
+
 def test_every_machine_has_every_level():
     """A machine that names nothing hidden has a fleet too: its tolerances and growing clearance."""
     for name in MACHINES:
