@@ -5,6 +5,7 @@ import numpy as np
 import pytest
 from click.testing import CliRunner
 
+from chaosgym.branches.bifurcation import _changes
 from chaosgym.branches.coexistence import coexistence
 from chaosgym.branches.diagram_search import follow
 from chaosgym.branches.margins import margins
@@ -145,3 +146,12 @@ def test_the_commands_print_margins_and_branches(tmp_path):
     assert table.read_text().startswith('"branch","period","speed","kind"')
     chaotic = CliRunner().invoke(app, ["diagnose", "impact-beam", "--budget", "100", "--margins"])
     assert "no margins: they need an orbit that is proven to attract, this response is chaotic" in chaotic.output
+
+
+@pytest.mark.parametrize(
+    ("crossed", "changes"),
+    [((), {0}), (("one",), {-1, 1}), (("circle",), {-2, 0, 2}), (("one", "minus one"), {-2, 0, 2})],
+)
+def test_multipliers_that_cross_explain_a_change_of_stability(crossed, changes):
+    """One real multiplier is one more or one fewer, a pair two, or none where two real ones only change places."""
+    assert _changes({name: name in crossed for name in ("one", "minus one", "circle")}) == changes

@@ -8,13 +8,14 @@ import pytest
 
 from chaosgym.classifier import classifier_for, default_classifier
 from chaosgym.classifier.answer import neighbours_of, type_probabilities
-from chaosgym.classifier.cascade import LONGEST_PERIOD, REPEATS, RETURNED
+from chaosgym.classifier.cascade import LONGEST_PERIOD, REPEATS, RETURNED, _affordable, _as_measured
 from chaosgym.diagnosis import diagnose
 from chaosgym.diagnosis.periodic_orbit import returning_period
 from chaosgym.diagnosis.type_rule import type_of_cross
 from chaosgym.errors import ModelFileError
 from chaosgym.machines import ImpactBeam
 from chaosgym.machines.machine_file import read_machine
+from chaosgym.simulation import simulate
 from tests.classifier.made_up import settled
 from tests.plain_modes import PLAIN_CRANK
 
@@ -178,3 +179,21 @@ def test_a_machine_of_ones_own_is_judged_by_proofs_and_by_its_forces():
 def test_a_shipped_classifier_is_used_where_there_is_one():
     """The general one is for machines that have none."""
     assert classifier_for(CALM) is default_classifier("impact-beam")
+
+
+def test_a_budget_that_is_spent_affords_nothing_and_one_that_is_left_does(monkeypatch):
+    """Half a microsecond is left, or none is: a step of no cost may still be taken, or not."""
+    monkeypatch.setattr("chaosgym.classifier.cascade.thread_time", lambda: 2.0)
+    monkeypatch.setattr("chaosgym.classifier.cascade.MILLION", 1.0)
+    for budget, affordable in ((2.5, True), (2.0, False), (1.5, False)):
+        assert _affordable(ImpactBeam(), 0.0, budget, 0, 0) is affordable
+
+
+def test_forces_are_those_of_the_side_that_is_hit_harder():
+    """At the mean level of the training, whatever the level of the record."""
+    record = simulate(ImpactBeam(excitation_frequency=12.0), 40, transient=20)
+    for column in (0, 1):
+        peaks = np.zeros((40, 2))
+        peaks[:, column], peaks[:, 1 - column] = np.arange(1.0, 41.0), 0.5
+        told = _as_measured(replace(record, peak_force=peaks))
+        np.testing.assert_allclose(told[0] / told[0, 0], np.arange(1.0, 41.0))

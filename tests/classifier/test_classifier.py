@@ -7,7 +7,8 @@ import pytest
 
 from chaosgym.classifier import MachineClassifier, default_classifier
 from chaosgym.classifier.data import examples_of
-from chaosgym.classifier.train import train_classifier
+from chaosgym.classifier.estimator import ResponseClassifier
+from chaosgym.classifier.train import LARGE, _trees, train_classifier
 from chaosgym.errors import DatasetError, ModelFileError, ParameterError
 from chaosgym.machines import MACHINES, ImpactBeam
 from chaosgym.simulation import simulate
@@ -201,3 +202,12 @@ def test_no_simulated_record_is_refused(name, shape):
         answers = classifier.classify_records(np.maximum(clean + real * noise, 0.0), sensor_error=told)
         assert {*answers["reason"]} <= {"", "too close to call"}
         assert np.mean(answers["abstained"]) <= (0.1 if told is None else 0.05)
+
+
+@pytest.mark.parametrize(("rows", "larger"), [(LARGE - 1, False), (LARGE, True)])
+def test_trees_of_many_rows_are_larger_and_more(rows, larger):
+    """Numbers that a classifier takes; below that its own."""
+    given = _trees(rows)
+    made = ResponseClassifier("records", **given)
+    assert bool(given) is larger
+    assert (made.rounds > ResponseClassifier("records").rounds) is larger

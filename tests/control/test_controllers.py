@@ -1,5 +1,7 @@
 """Controllers do what they are named after, on machines side by side."""
 
+from unittest.mock import Mock
+
 import gymnasium as gym
 import numpy as np
 import pytest
@@ -101,6 +103,36 @@ def test_looking_ahead_stays_within_the_range_of_the_task(monkeypatch):
     played = play(RecedingHorizon(), BEAM, np.arange(3), steps=40)
     assert np.nanmax(np.abs(played.speed - played.demand)) <= 2.0 + 4.5
     assert np.all(played.status == 1)
+
+
+def test_looking_ahead_searches_every_ten_steps_and_at_a_new_demand(monkeypatch):
+    """And at no other time: a search takes as long as the rest of the job."""
+    searched = []
+
+    def best(self, jobs, demand):
+        searched.append((step, jobs.tolist()))
+        return demand
+
+    monkeypatch.setattr(RecedingHorizon, "_best", best)
+    controller = RecedingHorizon()
+    envs = gym.make_vec(BEAM, num_envs=2).unwrapped
+    observations, _ = envs.reset(seed=[1, 2])
+    controller.start(envs)
+    monkeypatch.setattr(controller, "_batch", Mock())
+    rows = np.array(observations)
+    for step in range(12):
+        rows[:, PLACE.demand] = [20.0, 20.0 if step < 4 else 21.0]
+        controller.speeds(rows)
+    assert searched == [(0, [0, 1]), (4, [1]), (10, [0, 1])]
+
+
+def test_a_bar_is_shown_only_where_it_is_asked_for(capsys):
+    """A job that is played by a script says nothing on standard error."""
+    played = play(Follow(), BEAM, [12], steps=2)
+    assert {"machine": 12, "seed": played.seeds[0], "env": BEAM}.items() <= played.as_dict().items()
+    assert capsys.readouterr().err == ""
+    play(Follow(), BEAM, [12], steps=2, progress="a job")
+    assert "a job" in capsys.readouterr().err
 
 
 def test_those_that_know_models_use_their_maps(own, following):

@@ -17,6 +17,7 @@ from chaosgym.control.policies.shipped import shipped_folder, shipped_name
 from chaosgym.control.rollout import play
 from chaosgym.envs import ENVIRONMENTS, SB3VecEnv
 from chaosgym.envs.sb3 import SB3VisitedSpeeds
+from chaosgym.envs.vector_env import native_envs
 from chaosgym.errors import ModelFileError, ParameterError
 from tests.control.made_up import ENV, trained
 
@@ -143,6 +144,18 @@ def test_an_environment_without_a_policy_says_so():
     """And says how to get one."""
     with pytest.raises(ModelFileError, match=r"no policy is shipped for chaosgym/Nothing-v1.*agents/ppo.py"):
         shipped_policy("chaosgym/Nothing-v1")
+    with pytest.raises(ModelFileError, match=f"for {ENV}; shipped: "):
+        shipped_policy(ENV)
+    with pytest.raises(ModelFileError, match=f"for {ENV}, level nominal; shipped: "):
+        shipped_policy(ENV, "nominal")
+
+
+def test_a_policy_at_steps_of_another_length_is_warned_of():
+    """It reads means over other numbers of cycles than in training."""
+    layer = Dense(np.zeros((6, 14), np.float32), np.zeros(6, np.float32), "none")
+    policy = TrainedPolicy(ENV, "trim", Network(None, (layer,)), cycles_per_step=7)
+    with pytest.warns(UserWarning, match="steps of 7 cycles"):
+        policy.start(native_envs(ENV, 2))
 
 
 @pytest.mark.parametrize("level", [None, "fleet"])

@@ -40,3 +40,9 @@ def test_it_stays_within_reach(tables):
     played = play(Table(tables), BEAM, range(8))
     settled = (played.demand[2:] == played.demand[1:-1]) & (played.demand[1:-1] == played.demand[:-2])
     assert np.abs(played.speed - played.demand)[2:][settled].max() <= 2.0 + 1e-6
+
+
+def test_tables_of_the_same_jobs_are_the_same():
+    """Jobs have numbers of their own, so that tables can be made again."""
+    for one, other in zip(*(learned_tables(BEAM, jobs=2, steps=4) for _ in range(2)), strict=True):
+        np.testing.assert_array_equal(one, other)

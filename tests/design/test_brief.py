@@ -41,6 +41,13 @@ def test_template_of_every_machine_describes_the_machine_of_the_thesis(name, tmp
     assert found.costs == {found.machine.speed_field: 2.0}
 
 
+def test_a_change_may_be_one_value_or_several():
+    """A value alone is a list of one."""
+    one, more = (brief(f"[changes]\nclearance = {text}").changes for text in ('"2 mm"', '["2 mm", "3 mm"]'))
+    assert one == {"clearance": (pytest.approx(2e-3),)}
+    assert more == {"clearance": (pytest.approx(2e-3), pytest.approx(3e-3))}
+
+
 @pytest.mark.parametrize("name", sorted(MACHINES))
 def test_the_changes_of_a_template_may_be_emptied(name):
     """As docs/design.md advises for a first look: the weights of what is not searched stay where they are."""

@@ -1,12 +1,14 @@
 """Tolerances in combination: indices of a function with known ones, probabilities of a published interval."""
 
 from dataclasses import replace
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
 
 from chaosgym import read_machine
 from chaosgym.design import Criteria, assess
+from chaosgym.design.checks import Check
 from chaosgym.design.combination import (
     Combination,
     Influence,
@@ -17,7 +19,7 @@ from chaosgym.design.combination import (
     probability,
     total_indices,
 )
-from chaosgym.design.guidelines import case_of, guidelines
+from chaosgym.design.guidelines import _next, case_of, guidelines
 from chaosgym.diagnosis import Neighbour, Tolerance
 from chaosgym.diagnosis.precursors import measured_rates
 from chaosgym.errors import SimulationError
@@ -223,3 +225,11 @@ def test_guidelines_say_what_the_assessment_says(calm):
     open_ = replace(calm, nominal=replace(calm.nominal, nature="undetermined"), verdict="undetermined")
     assert case_of(open_) == "undetermined"
     assert "settle it" in guidelines(open_)[-1].sentence
+
+
+def test_the_next_step_names_the_criteria_that_are_missed():
+    """And no other."""
+    checks = [Check("life", 1.0, 2.0, "-"), Check("reliability", 0.99, 0.9, "-")]
+    assert [check.met for check in checks] == [False, True]
+    said = _next(SimpleNamespace(verdict="misses", checks=checks))
+    assert said == "life missed: change the machine, and assess it again"

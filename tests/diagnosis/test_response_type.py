@@ -13,6 +13,8 @@ from chaosgym.diagnosis import (
     response_type,
     types_on_grid,
 )
+from chaosgym.diagnosis.response_map import _neighbour
+from chaosgym.diagnosis.stage import lasting_margin
 from chaosgym.diagnosis.type_rule import Coexisting
 from chaosgym.errors import DiagnosisError, ParameterError
 from chaosgym.machines import THESIS_SLIDER_CRANK, ImpactBeam
@@ -141,3 +143,22 @@ def test_the_definition_of_the_window_is_part_of_the_label():
         response_type(beam, narrow, start="continuation", initial_states=1, budget=400).definition["start"]
         == "continuation"
     )
+
+
+def test_a_point_that_could_not_be_run_is_undetermined():
+    """Its neighbours are judged without it."""
+    told = _neighbour({"speed": 0.5}, None, ())
+    assert (told.shares, told.nature) == ({"speed": 0.5}, "undetermined")
+    assert np.isnan(told.largest_peak)
+
+
+@pytest.mark.parametrize(("cycles", "margin"), [(1, 0.0), (10**9, 1.0)])
+def test_the_margin_of_lasting_chaos_is_a_share(cycles, margin):
+    """However few cycles were seen, and however many."""
+    assert lasting_margin(cycles) == margin
+
+
+def test_tolerances_of_a_crank_are_in_rpm_and_of_a_beam_a_share():
+    """Ten turns a minute, or two per cent."""
+    assert default_tolerances(THESIS_SLIDER_CRANK)["crank_speed"] == Tolerance(10.0, relative=False)
+    assert default_tolerances(ImpactBeam())["excitation_frequency"] == Tolerance(0.02)

@@ -1,5 +1,7 @@
 """The trained sense of the motion as an entry of the observation."""
 
+import math
+
 import gymnasium as gym
 import numpy as np
 import pytest
@@ -8,7 +10,7 @@ import chaosgym
 from chaosgym.control.controllers import BackOff
 from chaosgym.control.rollout import play
 from chaosgym.envs.classified import UNKNOWN, RecordsAtSpeed
-from chaosgym.envs.sense import STATISTICS, load_sense, save_sense, shipped_sense
+from chaosgym.envs.sense import STATISTICS, Sense, load_sense, save_sense, shipped_sense
 from chaosgym.errors import ModelFileError, ParameterError
 
 BEAM = "chaosgym/ImpactBeam-v1"
@@ -47,6 +49,19 @@ def of_one(record, lags=(1, 2, 3, 4, 6, 8)):
     """Statistics of the peaks (cycles,) of one record."""
     missed = [np.abs(record[lag:] - record[:-lag]).mean() for lag in lags]
     return [record.mean(), record.std(), record.min(), record.max(), *missed]
+
+
+def test_a_network_gives_the_logistic_of_its_last_layer():
+    """Two rectified units in turn and one answer, by hand: a chance from 0 to 1, a half where nothing is said."""
+    entries = len(STATISTICS)
+    weights = np.zeros((1, entries)), np.array([[1.0]]), np.array([[2.0]])
+    weights[0][0, 0] = 1.0
+    biases = np.zeros(1), np.zeros(1), np.array([-1.0])
+    sense = Sense(1.0, np.zeros(entries), np.ones(entries), weights, biases)
+    statistics = np.zeros((3, entries))
+    statistics[:, 0] = [0.5, 3.0, -3.0]
+    expected = [0.5, 1.0 / (1.0 + math.exp(-5.0)), 1.0 / (1.0 + math.exp(1.0))]
+    np.testing.assert_allclose(sense(statistics), expected, rtol=1e-12)
 
 
 def test_a_record_is_what_was_felt_since_the_speed_changed():

@@ -100,6 +100,35 @@ def test_who_plays_meets_the_machines_of_the_split():
     assert not set(sealed.seeds) & set(played["test"].seeds)
 
 
+def test_a_machine_without_a_task_of_its_own_gets_shares_of_its_range():
+    """Seven slews cross its range; a demand changes by a fourteenth of it at least."""
+    from tests.third_machine import ImpactOscillator
+
+    machine = ImpactOscillator()
+    low, high = machine.usual_ranges[machine.speed_field]
+    task = known._usual_task(machine)
+    told = [getattr(task, name) for name in SHARES]
+    assert told == pytest.approx([(high - low) * share for share in SHARES.values()])
+    assert task.reference_force == 100.0
+
+
+SHARES = {
+    "slew_limit": 1 / 7,
+    "trim_step": 1 / 56,
+    "largest_trim": 1 / 7,
+    "smallest_change": 1 / 14,
+    "largest_change": 2 / 7,
+    "start_below": 1 / 7,
+}
+
+
+def test_jobs_of_a_vector_have_an_action_each():
+    """Its spaces are those of a job, stacked."""
+    envs = native_envs(BEAM, 3, action="speed")
+    assert envs.action_space.shape == (3, *envs.single_action_space.shape)
+    assert envs.observation_space.shape == (3, *envs.single_observation_space.shape)
+
+
 def test_a_machine_does_several_jobs_in_turn():
     """Three jobs on a machine, then three on another, with other demands, in a vector too; a seed begins anew."""
     single = gym.make(BEAM, level="fleet", jobs=3, steps=2).unwrapped
@@ -137,6 +166,14 @@ def test_what_is_refused_says_what_to_do(keywords, message):
     """A level or a split that does not exist, one that has no machines, and a misspelt keyword."""
     with pytest.raises(ParameterError, match=message):
         native_envs(BEAM, **keywords)
+
+
+def test_pictures_of_another_program_are_refused_by_its_name():
+    """Any machine has none either, and says so."""
+    with pytest.raises(ParameterError, match="not possible with split = 'other_simulator'; allowed: None"):
+        gym.make(BEAM, split="other_simulator", render_mode="rgb_array")
+    with pytest.raises(ParameterError, match="not possible with any machine; allowed: None"):
+        gym.make("chaosgym/AnyMachine-v0", render_mode="rgb_array")
 
 
 def test_every_machine_has_every_level():

@@ -294,3 +294,14 @@ def test_several_plants_run_side_by_side():
     assert observations[0, 6] != observations[1, 6]
     assert len(infos["judge"]) == 2
     envs.close()
+
+
+def test_one_hard_hit_does_not_make_a_step_unusable():
+    """The mean of a step counts against the limit of 900 N, not its largest cycle."""
+    env = made(Told)
+    env.reset(seed=0)
+    given = []
+    env.unwrapped.plant.run = lambda speed, cycles: given.append([1200.0] + [80.0] * (cycles - 1)) or given[-1]
+    observation, *_ = env.step(0)
+    told = dict(zip(env.unwrapped.observation_names, observation.tolist(), strict=True))
+    assert told["mean_peak_force"] == pytest.approx(np.mean(given[-1]))

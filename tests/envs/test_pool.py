@@ -31,6 +31,11 @@ def test_it_is_an_environment():
     check_env(gym.make(ANY).unwrapped)
 
 
+def test_sensors_of_any_machine_err_as_those_of_the_beam():
+    """1.25 % of the rated force."""
+    assert gym.make(ANY).unwrapped.task.sensor_error == 0.0125
+
+
 def test_same_seed_same_bytes_alone_and_side_by_side():
     """Four jobs on machines of several kinds: each sub-environment does what a single one with its seed does."""
     envs = gym.make_vec(ANY, num_envs=4)

@@ -1,6 +1,7 @@
 """The measured fidelity ladder: what it compares, and that its figures mean what they say."""
 
 import json
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -9,7 +10,7 @@ from click.testing import CliRunner
 from chaosgym.cli import app
 from chaosgym.errors import ParameterError
 from chaosgym.fidelity.sample import operating_points
-from chaosgym.fidelity.tradeoff import settings_of, tradeoff
+from chaosgym.fidelity.tradeoff import _measure, settings_of, tradeoff
 from chaosgym.machines import ImpactBeam, SliderCrank
 from chaosgym.plotting.fidelity import tradeoff_figure
 
@@ -94,3 +95,14 @@ def test_command_writes_its_files(tmp_path):
     assert "reference" in done.output
     assert (tmp_path / "tradeoff.png").stat().st_size > 10_000
     assert json.loads((tmp_path / "tradeoff.json").read_text())["machine"] == "impact-beam"
+
+
+def test_a_point_beyond_the_budget_is_not_begun(monkeypatch):
+    """A clock that ticks once a look: a cycle takes half a second, and a point its transient as well."""
+    ticks = iter(range(10**6))
+    monkeypatch.setattr("chaosgym.fidelity.tradeoff.time", SimpleNamespace(thread_time=lambda: next(ticks)))
+    found = [
+        _measure(ImpactBeam(), settings_of(ImpactBeam())[0], np.array([[12.0, 1e-4]]), 24, 10, budget).points
+        for budget in (16.9, 17.1)
+    ]
+    assert [len(points) for points in found] == [0, 1]

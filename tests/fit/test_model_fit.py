@@ -3,6 +3,7 @@
 ``python -m tests.fit.test_model_fit 8`` prints what it tells of eight machines of each kind.
 """
 
+import re
 import sys
 from dataclasses import replace
 from pathlib import Path
@@ -15,8 +16,8 @@ from chaosgym import ImpactBeam, SliderCrank, read_machine, simulate
 from chaosgym.diagnosis.diagnose import diagnose_alone
 from chaosgym.diagnosis.response_type import default_tolerances
 from chaosgym.errors import DiagnosisError
-from chaosgym.fit.model_draws import figures, names_of
-from chaosgym.fit.model_fit import ModelFit, model_fit, with_record
+from chaosgym.fit.model_draws import Draw, figures, names_of
+from chaosgym.fit.model_fit import ModelFit, _worst, model_fit, with_record
 from chaosgym.machines.machine_file import template
 from chaosgym.machines.parameters import with_settings
 from chaosgym.recordings.judge import judge_peaks
@@ -169,6 +170,42 @@ def test_records_of_no_such_machine_do_not_fit():
     found = model_fit(nominal, other)
     assert found.nature == "undetermined"
     assert found.reason.startswith("the model does not fit: of 420 simulated records the nearest differs by")
+
+
+@pytest.mark.usefixtures("few")
+def test_a_fit_that_is_at_ease_ends_after_its_third_round(beam, monkeypatch):
+    """Enough good draws at once: two rounds beside the first, and no fewer."""
+    for name, value in (("ROUNDS", 5), ("MOST", 1), ("ENOUGH", np.inf)):
+        monkeypatch.setattr(f"chaosgym.fit.model_fit.{name}", value)
+    nominal, _, peaks = beam
+    assert model_fit(nominal, peaks[:40]).draws == 12 + 6 + 6
+
+
+def test_machines_of_no_period_give_a_model_of_no_period(beam, monkeypatch):
+    """Every machine that agrees is chaotic: that is told, without a period."""
+    chaotic = replace(diagnose_alone(beam[1], budget=400), nature="chaotic", period=None)
+    monkeypatch.setattr("chaosgym.fit.model_fit.diagnose_alone", lambda *_, **__: chaotic)
+    for name, value in (("FIRST", 12), ("LATER", 6), ("ROUNDS", 2), ("FEWEST", 1), ("FITS", np.inf)):
+        monkeypatch.setattr(f"chaosgym.fit.model_fit.{name}", value)
+    nominal, _, peaks = beam
+    found = model_fit(nominal, peaks[:40], estimate=["clearance"])
+    assert (found.nature, found.period, found.shares) == ("chaotic", None, {"chaotic": pytest.approx(1.0)})
+    one = found.estimates["clearance"]
+    assert 0.5 * nominal.clearance <= one.low < one.value < one.high <= 2.0 * nominal.clearance
+
+
+@pytest.mark.parametrize(
+    ("difference", "parts", "why"),
+    [
+        (3.0, [0.1, -3.0, 2.0], "differs by 3 times .* most in scatter, which is below the measured one"),
+        (3.0, [3.0, -1.0, 2.0], "differs by 3 times .* most in mean, which is above the measured one"),
+        (np.inf, [np.nan] * 3, "none has a force where the sensor reads one"),
+    ],
+)
+def test_the_nearest_draw_says_in_what_it_differs(difference, parts, why):
+    """The largest part counts, whatever its sign."""
+    draw = Draw(np.zeros(1), difference, np.array(parts), 0.01, None)
+    assert re.search(why, _worst(draw, names_of(1)[0]))
 
 
 def test_record_and_model_that_contradict_each_other_decide_nothing():

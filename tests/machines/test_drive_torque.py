@@ -86,6 +86,16 @@ def test_mean_power_is_the_work_of_the_gas():
     assert fast.mean_power == pytest.approx(100.0 * math.pi * work, rel=1e-9)
 
 
+def test_a_flywheel_takes_up_the_work_of_a_sine():
+    """A torque of 3 N m and a sine of 2 N m: 4 J above the mean, and 6 N m times 10 rad/s at the peak."""
+    drive = DriveTorque(3.0 + 2.0 * np.sin(2.0 * np.pi * np.arange(3600) / 3600), 10.0)
+    assert drive.energy_swing == pytest.approx(4.0, rel=1e-5)
+    assert drive.flywheel(0.02) == pytest.approx(4.0 / (0.02 * 100.0), rel=1e-5)
+    told = drive.as_dict()
+    assert told["mean_power_W"] == pytest.approx(30.0)
+    assert told["largest_power_W"] == pytest.approx(50.0)
+
+
 @pytest.mark.slow
 def test_a_flywheel_holds_the_speed_as_told():
     """A crank with its flywheel turns under the mean torque, by DOP853: its speed swings by the 1 % asked for.

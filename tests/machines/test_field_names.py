@@ -1,11 +1,15 @@
 """Every command knows a machine's speed and clearance by these words."""
 
+from typing import get_args
+
 import pytest
 
 from chaosgym import ImpactBeam, SliderCrank
 from chaosgym.branches.family_along import continuous_field
 from chaosgym.fit.model_draws import fields_to_estimate
-from chaosgym.machines.parameters import with_settings
+from chaosgym.machines import MACHINES
+from chaosgym.machines.modal_machine.places import terms_of
+from chaosgym.machines.parameters import Provenance, markdown_table, parameters_of, with_settings
 from chaosgym.simulation import simulate
 from tests.cli.run import run, run_json
 
@@ -31,3 +35,29 @@ def test_a_sweep_takes_the_word_speed_and_suggests_it(tmp_path):
     assert "did you mean speed?" in refused[2]
     refused = run("sweep", "impact-beam", "--workers", "x", "--out", tmp_path / "b")
     assert "neither a number of threads, 1 to 4096, nor tcp://HOST:PORT" in refused[2]
+
+
+@pytest.mark.parametrize("machine", [*MACHINES.values()])
+def test_every_number_says_where_it_is_from(machine):
+    """By one of the five words of the documentation, in the table of its page too."""
+    rows, one = markdown_table(machine()), machine()
+    known = parameters_of(one)
+    assert {about.provenance for about in known.values()} <= set(get_args(Provenance))
+    clearance = getattr(one, one.clearance_field)
+    assert any(row.startswith(f"| `{one.clearance_field}` | {clearance:.6g} | m | ") for row in rows)
+    assert len(rows) == 2 + len(known)
+
+
+@pytest.mark.parametrize(
+    ("place", "term"),
+    [
+        ("arm", (1.0, "arm", False)),
+        ("2 arm", (2.0, "arm", False)),
+        ("- 1/4 arm", (-0.25, "arm", False)),
+        ("50 mm arm", (0.05, "arm", True)),
+    ],
+)
+def test_a_factor_with_a_unit_is_a_lever(place, term):
+    """A radius at which a point turns; a plain number is a ratio."""
+    (found,) = terms_of(place)
+    assert found == (pytest.approx(term[0]), *term[1:])

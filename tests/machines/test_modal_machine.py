@@ -27,6 +27,7 @@ from chaosgym.fit.model_draws import fields_to_estimate
 from chaosgym.machines.beam_element import bending_matrices
 from chaosgym.machines.impact_beam.modes import modal_analysis
 from chaosgym.machines.machine_file import schema_text, template
+from chaosgym.machines.modal_machine.structure import _with_residual
 from chaosgym.machines.parameters import with_settings
 from chaosgym.plotting import response
 from chaosgym.sweeps import read_sweep
@@ -115,6 +116,13 @@ def test_kept_modes_and_the_residual_one_have_the_static_compliance():
     assert compliance[None] < 0.999 * exact
     first = found.angular_frequency[0] * length**2 * math.sqrt(0.8 / stiffness)
     assert first == pytest.approx(1.8751040687**2, rel=1e-5)
+
+
+@pytest.mark.parametrize("frequency", [1e-4, np.inf])
+def test_a_residual_frequency_out_of_range_is_told_in_hertz(frequency):
+    """Its range has the unit in which it is given."""
+    with pytest.raises(ParameterError, match=r"residual frequency = .* Hz is out of range"):
+        _with_residual(np.ones(1), np.eye(1), {"tip": np.ones(1)}, "tip", 1e-6, frequency)
 
 
 def test_a_large_sparse_model_is_the_dense_one():

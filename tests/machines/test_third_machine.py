@@ -13,6 +13,7 @@ from chaosgym.cli import app
 from chaosgym.envs import TASKS, register_environments
 from chaosgym.errors import ChaosgymError
 from chaosgym.machines import MACHINES, register_machine
+from chaosgym.machines.machine import Machine
 from tests.design.small import small_studies
 from tests.third_machine import ImpactOscillator
 
@@ -127,3 +128,9 @@ def test_environments(task):
     envs = gym.make_vec(name, num_envs=2)
     observations, _ = envs.reset(seed=1)
     np.testing.assert_array_equal(observations[0], first)
+
+
+def test_coordinates_count_alike_whatever_their_unit():
+    """The weight of a coordinate is one over its size; what is nothing beside the others weighs as the largest."""
+    assert Machine.state_weights(ImpactOscillator(), np.array([2.0, -4.0])).tolist() == [0.5, 0.25]
+    assert Machine.state_weights(ImpactOscillator(), np.array([0.0, 4.0])).tolist() == [0.25, 0.25]

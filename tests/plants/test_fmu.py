@@ -12,7 +12,7 @@ import pytest
 
 import chaosgym
 from chaosgym.errors import ParameterError
-from chaosgym.plants.fmu import FmuPlant
+from chaosgym.plants.fmu import FmuPlant, described
 from chaosgym.simulation.fmu import export_fmu
 from docs.examples.rig import Rig
 from tests.cli.run import run, run_json
@@ -312,6 +312,27 @@ def test_a_bad_fmu_is_told_in_one_line(case, rig, plants, tmp_path, monkeypatch)
         play()
     assert "\n" not in str(told.value)
     assert len(str(told.value)) < 500
+
+
+def test_an_archive_may_have_as_much_as_is_allowed_and_no_more(rig, monkeypatch):
+    """Bytes and files at the limit are read; a byte or a file beyond it is refused."""
+    with zipfile.ZipFile(rig) as archive:
+        size, files = sum(one.file_size for one in archive.infolist()), len(archive.infolist())
+    for name, value in (("LARGEST", size), ("MOST", files)):
+        monkeypatch.setattr(f"chaosgym.plants.fmu.{name}", value)
+        assert described(rig).fmiVersion == "2.0"
+        with monkeypatch.context() as tight:
+            tight.setattr(f"chaosgym.plants.fmu.{name}", value - 1)
+            with pytest.raises(ParameterError, match="unpacked; allowed: up to"):
+                described(rig)
+
+
+def test_the_last_line_that_an_fmu_printed_is_told(rig, tmp_path):
+    """Of several lines the last that says something."""
+    plant = FmuPlant(rig, **PORTS)
+    plant._folder = tmp_path
+    (tmp_path / "printed.txt").write_text("a start\nno licence\n\n")
+    assert plant._last_words() == "; it printed: no licence"
 
 
 def test_a_step_that_an_fmu_can_not_take_is_refused(rig, plants, tmp_path):

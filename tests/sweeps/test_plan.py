@@ -11,6 +11,7 @@ import pytest
 from chaosgym.errors import ParameterError
 from chaosgym.machines.parameters import parameters_of
 from chaosgym.sweeps import Axis, SweepPlan
+from chaosgym.sweeps.dataset import schema
 from chaosgym.sweeps.plan import default_axes
 from tests.plain_modes import PLAIN_BEAM
 
@@ -61,6 +62,9 @@ def test_drawn_points_fill_the_range_and_depend_on_the_seed_alone(sampling):
         assert not np.array_equal(first[name], other[name])
         assert low <= first[name].min() < low + 0.1 * (high - low)
         assert high - 0.2 * (high - low) < first[name].max() <= high
+    if sampling == "random":
+        drawn = np.random.default_rng(1).random((100, 2))
+        np.testing.assert_allclose(first["clearance"], 1e-5 + 2e-5 * drawn[:, 1])
 
 
 @pytest.mark.parametrize("sampling", ["grid", "random", "sobol", "crosses"])
@@ -81,6 +85,18 @@ def test_any_rows_can_be_computed_by_themselves(sampling):
 
 HIGHEST = parameters_of(PLAIN_BEAM)["excitation_frequency"].high
 CROSS_AXES = (Axis("length", 0.265, 0.293), Axis("excitation_frequency", 1.0, 40.0), Axis("clearance", 1e-5, 3e-4))
+
+
+def test_types_say_what_they_were_found_from():
+    """Rows of a grid have the points beside them, rows of crosses the arms of the cross."""
+    grid = SweepPlan(PLAIN_BEAM, (Axis("clearance", 1e-5, 3e-5, 3),))
+    told = [
+        schema(plan, {}).field("response_type").metadata
+        for plan in (grid, SweepPlan(PLAIN_BEAM, CROSS_AXES, "crosses", 2, 2))
+    ]
+    assert told[0] != told[1]
+    assert b"cross" in told[1][b"meaning"]
+    assert b"cross" not in told[0][b"meaning"]
 
 
 def test_arms_of_a_cross_are_one_tolerance_long():
