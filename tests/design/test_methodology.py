@@ -17,7 +17,7 @@ from chaosgym.design.fatigue import equivalent_force, rating_life
 from chaosgym.design.improve import _rank
 from chaosgym.design.reliability import hertz_pressure, normal_reliability
 from chaosgym.design.runs import build_series, settled_run
-from chaosgym.design.study import study
+from chaosgym.design.surroundings import in_tolerance, map_around
 from chaosgym.design.trends import fit_trend
 from chaosgym.design.trials import Trial
 from chaosgym.diagnosis import Tolerance
@@ -47,8 +47,9 @@ def test_chaos_beside_a_motion_within_the_tolerances_counts(tmp_path):
     for old, new in (("10 Hz", "22.508 Hz"), ("0.2 mm", "0.1 mm"), ("20 N", "65 N"), ("16 Hz", "17 Hz")):
         text = text.replace(f'"{old}"', f'"{new}"')
     (tmp_path / "bracket.toml").write_text(text)
-    brief = replace(read_brief(tmp_path / "bracket.toml"), series_size=8)
-    found = study(brief, verdict_only=True, workers=1).assessment
+    brief = read_brief(tmp_path / "bracket.toml")
+    further = in_tolerance(map_around(brief, 1, False))
+    found = assess(brief.machine, brief.region, brief.criteria, series_size=8, further=further, workers=1)
     assert [one.nature for one in found.series.runs] == ["periodic"] * 8
     assert found.type == "III"
     assert found.evaluation.largest_force == pytest.approx(135.0, abs=1.5)

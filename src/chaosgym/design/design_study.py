@@ -29,7 +29,7 @@ from chaosgym.version import __version__
 NO_TREND = "the gap closes at no speed of the usual range"
 """Why life is not drawn against speed."""
 
-LEFT_OUT = "map of types, life against speed, total indices, margins and changes"
+LEFT_OUT = "map of types with other motions in the tolerances, life against speed, total indices, margins and changes"
 """What a study of the verdict alone does without."""
 
 

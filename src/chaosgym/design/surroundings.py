@@ -44,8 +44,7 @@ def in_tolerance(around: ResponseMap | None) -> tuple[Neighbour, ...]:
 def map_around(brief: DesignBrief, workers: int | None, progress: bool, *, within: bool = False) -> ResponseMap | None:
     """Types over speed and clearance; None where these do not vary or leave their range.
 
-    ``within`` leaves out machines beyond the tolerances: types there mean nothing then. States that are carried along
-    the speeds begin within, too.
+    ``within`` leaves out machines beyond the tolerances and motions beside those from rest; types mean nothing then.
     """
     machine, region = brief.machine, brief.region
     for name in (machine.speed_field, machine.clearance_field):
@@ -61,7 +60,7 @@ def map_around(brief: DesignBrief, workers: int | None, progress: bool, *, withi
             speeds,
             clearances,
             {} if within else region,
-            initial_states=MAP_STARTS,
+            initial_states=1 if within else MAP_STARTS,
             budget=DIAGNOSIS_BUDGET,
             workers=workers,
             progress=progress,
