@@ -17,10 +17,10 @@ from chaosgym.design.fatigue import equivalent_force, rating_life
 from chaosgym.design.improve import _rank
 from chaosgym.design.reliability import hertz_pressure, normal_reliability
 from chaosgym.design.runs import build_series, settled_run
-from chaosgym.design.surroundings import in_tolerance, map_around
+from chaosgym.design.surroundings import MAP_STARTS, in_tolerance
 from chaosgym.design.trends import fit_trend
 from chaosgym.design.trials import Trial
-from chaosgym.diagnosis import Tolerance
+from chaosgym.diagnosis import Tolerance, response_map
 from chaosgym.errors import ParameterError
 from chaosgym.machines import MACHINES, ImpactBeam
 from chaosgym.machines.machine_file import template
@@ -48,7 +48,10 @@ def test_chaos_beside_a_motion_within_the_tolerances_counts(tmp_path):
         text = text.replace(f'"{old}"', f'"{new}"')
     (tmp_path / "bracket.toml").write_text(text)
     brief = read_brief(tmp_path / "bracket.toml")
-    further = in_tolerance(map_around(brief, 1, False))
+    grid = (
+        brief.region[name].at(getattr(brief.machine, name), 0.5 * np.arange(-2, 3)) for name in ("speed", "clearance")
+    )
+    further = in_tolerance(response_map(brief.machine, *grid, {}, initial_states=MAP_STARTS, workers=1))
     found = assess(brief.machine, brief.region, brief.criteria, series_size=8, further=further, workers=1)
     assert [one.nature for one in found.series.runs] == ["periodic"] * 8
     assert found.type == "III"
