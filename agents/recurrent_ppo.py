@@ -47,7 +47,10 @@ def arguments() -> argparse.Namespace:
     parser.add_argument("--gae-lambda", type=float, default=0.9)
     parser.add_argument("--units", type=int, default=64)
     parser.add_argument("--across-jobs", action="store_true", help="One episode is all jobs of a machine.")
-    return parser.parse_args()
+    asked = parser.parse_args()
+    if asked.across_jobs and int(asked.keywords.get("jobs", 1)) < 2:
+        parser.error("--across-jobs needs several jobs of a machine: --keywords '{\"jobs\": 5}'")
+    return asked
 
 
 class JobsInOne(VecEnvWrapper):

@@ -3,6 +3,7 @@
 import json
 from dataclasses import replace
 
+import gymnasium as gym
 import numpy as np
 import pytest
 
@@ -213,3 +214,9 @@ def test_a_trained_policy_at_a_foreign_plant_follows(tmp_path, monkeypatch):
     assert told["foreign"] is True
     assert told["speed"] == told["follow"]["speed"]
     assert "foreign to the policy" in run(*ask)[1]
+
+
+def test_an_environment_that_was_made_is_no_id():
+    """It is how other libraries are asked; here machines are made of the id, one after the other."""
+    with pytest.raises(ParameterError, match="env is no id; give one such as"):
+        chaosgym.evaluate(lambda observation: 0, gym.make("chaosgym/ImpactBeam-v1"))

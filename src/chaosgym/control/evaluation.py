@@ -18,7 +18,7 @@ from chaosgym.control.rollout import Played, Policy, play
 from chaosgym.control.scores import ONE, ZERO, Scores
 from chaosgym.envs.memory import SpeedMemory
 from chaosgym.envs.vector_env import native_envs
-from chaosgym.errors import ModelFileError
+from chaosgym.errors import ModelFileError, ParameterError
 from chaosgym.files import first_line
 from chaosgym.numbers import whole
 
@@ -203,11 +203,12 @@ def evaluate(
     Parameters
     ----------
     policy
-        As for ``policy_of``.
+        Folder of an exported policy, a file or a model of stable-baselines3, or a function from an observation to an
+        action; see ``policy_of``.
     env
-        Id of the environment, or the file of a machine.
+        Id of the environment, or the file of a machine; no environment that was made.
     machines
-        How many, from the first on.
+        How many, from the first on. All 256 take half a minute; few give wide intervals.
     guard
         Whether it plays behind a guard, as ``chaosgym.Operator`` and ``chaosgym run-agent`` play it.
     progress
@@ -216,10 +217,16 @@ def evaluate(
         Of the environment. The scale of the default ones is shipped for the beam's tolerances, and for fewer machines
         of other ids and of the fleet's test split; any other scale is computed first, in minutes.
 
+    Returns
+    -------
+    Evaluation
+        Its ``score`` is 0 for following the demand and 1 for the machine's own map, and may exceed 1.
+
     Raises
     ------
     ParameterError
-        If it is to be guarded and does not know what was usual in training, or fewer machines are kept.
+        If ``env`` is no id, fewer machines are kept, or the policy is to be guarded and does not know what was usual in
+        training.
 
     Examples
     --------
@@ -227,6 +234,8 @@ def evaluate(
     >>> round(follows.deviation, 3)
     0.016
     """
+    if not isinstance(env, str | Path):
+        raise ParameterError("env is no id; give one such as 'chaosgym/ImpactBeam-v1', not what was made of it")
     machines = whole("machines", machines, 1, native_envs(env, **keywords).settings.variants.count)
     runs = policy_of(policy, **keywords)
     runs = GuardedPolicy(runs) if guard else runs
