@@ -33,7 +33,12 @@ SHARED = ("tests/test_thresholds.py", "tests/test_arguments.py", "tests/test_exa
 ALONE = ("tests/test_files.py", "tests/machines/test_numbers.py", "tests/test_fuzz.py")
 """Tests of the modules that are in no folder."""
 
+COMMANDS = tuple(f"tests/{name}" for name in ("branches", "control", "design", "fidelity", "fit", "plants"))
+"""Folders whose tests run commands of their own, and draw what these draw."""
+
 MORE = {
+    "cli": COMMANDS,
+    "plotting": (*COMMANDS, "tests/cli"),
     "recordings": ("tests/series", *(f"tests/cli/test_{name}_cli.py" for name in ("measured", "run_up", "monitor"))),
     "series": ("tests/recordings",),
 }
