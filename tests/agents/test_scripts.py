@@ -243,6 +243,7 @@ for level in ("clearance", "fleet"):
 def test_keywords_that_are_none_end_in_one_line(script, text, tmp_path, monkeypatch, capsys):
     """No JSON, no object, no keyword of the environment: exit code 2 and one line that says so."""
     path = str(AGENTS / f"{script}.py")
+    monkeypatch.syspath_prepend(str(AGENTS))  # as Python does for a script
     monkeypatch.setattr(sys, "argv", [path, "--keywords", text, "--out", str(tmp_path / "run")])
     with pytest.raises(SystemExit) as ended:
         runpy.run_path(path, run_name="__main__")
