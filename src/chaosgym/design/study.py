@@ -45,7 +45,8 @@ def study(
     brief
         What is asked.
     verdict_only
-        Leave out what the verdict does not rest on: ``design_study.LEFT_OUT``.
+        Leave out what takes long: ``design_study.LEFT_OUT``. Motions beside that from rest then count at the nominal
+        machine alone, so the verdict can be milder than that of the whole study.
     seed
         Of the series and the bootstrap.
     workers
